@@ -41,7 +41,26 @@ def integrators_of_a_test_end_with_it() -> Iterator[None]:
 @pytest.fixture
 def undiagnosed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Scores without the search for what explains an error, which takes a second: where it is not the point."""
-    monkeypatch.setattr("heavytop.features.score.measurement.diagnose", lambda *_, **__: [])
+    monkeypatch.setattr("heavytop.features.score.diagnose.diagnosis.diagnose", lambda *_, **__: [])
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages without what matplotlib writes of their pictures, half of the time of a page: where it is not looked at."""
+    _leave_pictures_out(monkeypatch)
+
+
+def _leave_pictures_out(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr("heavytop.report.document.svg._inline", lambda figure, name: "")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def pictures(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Pages of a file are undrawn unless it is marked ``pictures``."""
+    with pytest.MonkeyPatch.context() as patch:
+        if not request.node.get_closest_marker("pictures"):
+            _leave_pictures_out(patch)
+        yield
 
 
 def _needed(error: BaseException | None) -> str:

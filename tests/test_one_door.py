@@ -1,6 +1,7 @@
 """Command line and Python are one: the same input gives the same numbers, or the same error with the same remedy."""
 
 import json
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -121,11 +122,16 @@ def of_command(command: str, given: dict[str, str]) -> Any:
 
 
 def outcome(call: Callable[[], Any]) -> Any:
-    """What it gives, or its error in words."""
+    """What it gives, or its error in words, with options of the command line by the names of Python's arguments."""
     try:
         return call()
     except HeavyTopError as error:
-        return type(error), error.cause, error.remedy
+        return type(error), _in_python(error.cause), _in_python(error.remedy)
+
+
+def _in_python(text: str) -> str:
+    text = text.replace("--max-steps", "step_limit")
+    return re.sub(r"--([a-z][a-z-]*)", lambda option: option[1].replace("-", "_"), text)
 
 
 @pytest.mark.slow

@@ -151,7 +151,7 @@ def test_a_folder_that_holds_anything_and_an_unknown_language_are_refused(tmp_pa
 
 
 def gate_moves(folder: Path) -> None:
-    """The gate refuses to run without a baseline, begins it, is green, finds a mistake, and moves with old and new."""
+    """The gate refuses to run without a baseline, begins it, finds a mistake, and moves with old and new."""
     plan = 'name = "tiny"\nintegrators = ["mine.toml"]\n[[measure]]\nkind = "work_precision"\ncases = ["euler"]\n'
     ladder = 'horizon = "1"\nsamples = 2\nladders = [{ integrator = "mine", steps = ["1/20", "1/40"] }]\n'
     (folder / "gate.toml").write_text(plan + ladder)
@@ -167,7 +167,6 @@ def gate_moves(folder: Path) -> None:
     code, said = gate("--bless")
     assert code == 0
     assert said.startswith("Begin the baseline of accuracy\n\nPlan tiny: 2 measurements")
-    assert gate()[0] == 0
     text = (folder / "mine.py").read_text()
     (folder / "mine.py").write_text(text.replace("p + 2 * q", "p + 2.001 * q"))
     code, said = gate("--json")

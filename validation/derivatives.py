@@ -23,12 +23,12 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from flint import arb, arb_mat
+from flint import arb, arb_mat, arb_series
 
 import heavytop as ht
 from heavytop.cases import CASES, Case, named_bodies
 from heavytop.errors import HeavyTopError
-from heavytop.exact.enclosure.derivatives import Dual, derivatives, moved
+from heavytop.exact.enclosure.derivatives import derivatives, moved
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, midpoint, radius, working_precision
 from heavytop.harness.case_text import ensemble_of, one_motion
@@ -97,13 +97,15 @@ def _integrals(motion):
 
 
 def _gradient(integral, p, y):
-    return [
-        Dual.of(integral.value(p, [Dual(v, arb(int(i == k))) for i, v in enumerate(y)])).slope + arb(0) for k in SIX
-    ]
+    return [_slope(integral.value(p, [arb_series([v, int(i == k)], 2) for i, v in enumerate(y)])) for k in SIX]
 
 
 def _datum(integral, p, y, k):
-    return Dual.of(integral.value(moved(p, k, Dual(arb(0), arb(1))), y)).slope + arb(0)
+    return _slope(integral.value(moved(p, k, arb_series([0, 1], 2)), y))
+
+
+def _slope(value):
+    return arb_series(value, 2)[1]
 
 
 def _off(matrix, vector, wanted):

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
 from heavytop import written_numbers
-from heavytop.errors import ImpossibleBody, InputError, quoted
+from heavytop.errors import ImpossibleBody, InputError, argument, quoted
 from heavytop.precision import (
     DOUBLE,
     EXTENDED,
@@ -146,7 +146,7 @@ def positive(value: Number | None, what: str) -> Fraction | None:
     """A positive number, or None."""
     number = None if value is None else physical(value, what)
     if number is not None and number <= 0:
-        raise InputError(f"{what} must be positive; got {shown(number)}.", "Give a number above 0.")
+        raise InputError(f"{argument(what)} must be positive; got {shown(number)}.", "Give a number above 0.")
     return number
 
 
@@ -156,7 +156,7 @@ def count(value: int | None, what: str) -> int | None:
         return None
     number = as_integer(value, what)
     if number < 1:
-        raise InputError(f"{what} = {quoted(number)} allows nothing.", "Give 1 or more, or leave it out.")
+        raise InputError(f"{what} must be at least 1; got {quoted(number)}.", "Give 1 or more, or leave it out.")
     return min(number, _MOST)
 
 
@@ -164,7 +164,7 @@ def steps(value: int | None) -> int | None:
     """A limit of steps, or None."""
     number = None if value is None else as_integer(value, "step_limit")
     if number is not None and number < 1:
-        raise InputError(f"step_limit = {quoted(number)} allows no step.", "Give 1 or more.")
+        raise InputError(f"{argument('step_limit')} = {quoted(number)} allows no step.", "Give 1 or more.")
     return None if number is None else min(number, _MOST)
 
 

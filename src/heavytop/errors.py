@@ -1,10 +1,12 @@
 """The program's own errors.  The text of each is the cause, with the offending value, then the remedy."""
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from contextvars import ContextVar
 from difflib import get_close_matches
 from enum import IntEnum
+from typing import Any, get_args, get_type_hints
 
 
 class ExitCode(IntEnum):
@@ -29,6 +31,24 @@ _TYPES = {
 }
 
 
+_options: ContextVar[Mapping[str, str]] = ContextVar("_options", default={})  # noqa: B039 - never changed in place
+
+
+def argument(name: str) -> str:
+    """An argument as the user wrote it: its name, or the option of the command line that gives it."""
+    return _options.get().get(name, name)
+
+
+@contextmanager
+def options_named(options: Mapping[str, str]) -> Iterator[None]:
+    """Errors in this block name arguments by these options of the command line."""
+    token = _options.set(options)
+    try:
+        yield
+    finally:
+        _options.reset(token)
+
+
 def quoted(value: object, most: int = 60) -> str:
     """Any value for a message: its ``repr`` on one line, cut short; what has none is named by its type."""
     try:
@@ -38,8 +58,11 @@ def quoted(value: object, most: int = 60) -> str:
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
-def invalid(error: Exception) -> str:
-    """The fault of a value in a table of TOML: where it stands, what it has to be, and what it is."""
+def invalid(error: Exception, kind: type | None = None) -> str:
+    """The fault of a value in a table of TOML: where it stands, what it has to be, and what it is.
+
+    kind: the record that the file is read as, which knows the words that a key may have.
+    """
     text, _, path = str(error).partition(" - at `$")
     path = path.strip("`.") or "the file"
     if match := re.fullmatch(r"Expected `([^`]*)`, got `(\w+)`", text):
@@ -54,7 +77,22 @@ def invalid(error: Exception) -> str:
         return f"{path} lacks the key {match[1]}"
     if match := re.fullmatch(r"Object contains (unknown field `.*`)", text):
         return f"{match[1]} in {path}"
+    if (match := re.fullmatch(r"Invalid enum value (.*)", text)) and (words := _words(kind, path)):
+        return f"{path} = {match[1]}: {' or '.join(filter(None, (', '.join(words[:-1]), words[-1])))}"
     return str(error)
+
+
+def _words(kind: Any, path: str) -> list[str]:
+    """The texts that the key at ``path`` may have in a record; none where it is not there."""
+    for key in re.findall(r"[A-Za-z_]\w*", path):
+        record = next((part for part in _parts(kind) if key in getattr(part, "__annotations__", {})), None)
+        kind = get_type_hints(record)[key] if record else None
+    return [*(["true", "false"] if bool in _parts(kind) else []), *(part for part in _parts(kind) if type(part) is str)]
+
+
+def _parts(kind: Any) -> list[Any]:
+    """A type and all those in it: the texts of a Literal, the entries of a list."""
+    return [kind, *(part for entry in get_args(kind) for part in _parts(entry))]
 
 
 def why(error: Exception) -> str:

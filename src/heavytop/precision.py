@@ -20,7 +20,7 @@ from numbers import Rational
 from operator import index, is_
 from typing import TYPE_CHECKING, Any, Protocol, Self, SupportsIndex, TypeAlias, TypeVar, cast
 
-from heavytop.errors import HeavyTopError, InputError, quoted
+from heavytop.errors import HeavyTopError, InputError, argument, quoted
 from heavytop.extras import import_heyoka
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def as_integer(value: Any, what: str) -> int:
             return index(value)
     except Exception:  # no integer, or a foreign __index__ that raises
         pass
-    raise InputError(f"{what}: {quoted(value)} is not an integer.", "Give an integer such as 53.")
+    raise InputError(f"{argument(what)}: {quoted(value)} is not an integer.", "Give an integer such as 53.")
 
 
 def available() -> dict[str, str | None]:
@@ -258,10 +258,12 @@ def physical(number: Any, what: str) -> Fraction:
     try:
         value = exact(number)
     except InputError as error:
-        raise InputError(f"{what}: {error.cause}", error.remedy) from None
+        raise InputError(f"{argument(what)}: {error.cause}", error.remedy) from None
     apart = value.numerator.bit_length() - value.denominator.bit_length()
     if apart >= _LARGE_POWER and abs(value) > LARGEST:
-        raise InputError(f"{what} = {shown(value)} is too large.", "Choose other units: numbers go up to 1e150.")
+        raise InputError(
+            f"{argument(what)} = {shown(value)} is too large.", "Choose other units: numbers go up to 1e150."
+        )
     return value
 
 
@@ -538,11 +540,13 @@ def vector(values: Iterable[Any], what: str) -> Vector:
     """Three exact rationals out of anything :func:`heavytop.precision.exact` reads; raises InputError otherwise."""
     parts = ordered(values, what, "Give three numbers, one for each principal axis: x,y,z.")
     if len(parts) != 3:
-        raise InputError(f"{what} has {len(parts)} numbers.", "Give three, one for each principal axis: x,y,z.")
+        raise InputError(
+            f"{argument(what)} has {len(parts)} numbers.", "Give three, one for each principal axis: x,y,z."
+        )
     try:
         first, second, third = (exact(part) for part in parts)
     except InputError as error:
-        raise InputError(f"{what}: {error.cause}", error.remedy) from None
+        raise InputError(f"{argument(what)}: {error.cause}", error.remedy) from None
     return first, second, third
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import heavytop as ht
+from support import audits
 
 TOP = ht.HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
 REST = ht.HeavyTop((2, 2, 2), 0, (0, 0, 0))
@@ -141,6 +142,7 @@ def test_an_unknown_option_is_refused_as_python_refuses_it() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("undiagnosed")
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize(
     ("name", "argument"),
@@ -150,6 +152,7 @@ def test_one_odd_argument_is_answered_or_refused_in_words(
     name: str, argument: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    audits.here(monkeypatch)
     function, arguments = GOOD[name]
     # arguments of one kind are checked in one place: each function is asked every fourth value, or fewer where it takes
     # its time, others for each argument
@@ -166,6 +169,7 @@ def test_one_odd_argument_is_answered_or_refused_in_words(
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("undiagnosed")
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", ["HeavyTop", "State", "propagate", "ensemble", "reference", "score", "compare"])
 def test_two_odd_arguments_at_once_are_answered_or_refused_in_words(
@@ -184,6 +188,7 @@ NUMBERS = [value for value in ODD if not isinstance(value, list | tuple | dict |
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("undiagnosed")
 @pytest.mark.filterwarnings("ignore")
 def test_one_odd_component_is_answered_or_refused_in_words() -> None:
     for place, odd in enumerate(NUMBERS):
@@ -237,7 +242,7 @@ def test_one_odd_component_is_answered_or_refused_in_words() -> None:
         (lambda: ht.propagate(TOP, START, "123"), "times = '123' is not a list"),
         (lambda: ht.ensemble([TOP] * 2, [START] * 3, [1]), "2 tops and 3 starts"),
         (lambda: ht.ensemble([], START, [1]), "0 tops"),
-        (lambda: ht.ensemble(TOP, START, [1], threads=0), "threads = 0"),
+        (lambda: ht.ensemble(TOP, START, [1], threads=0), "threads must be at least 1; got 0"),
         (lambda: ht.reference(TOP, START, [1], 0), "digits must be from 1 to 20000; got 0"),
         (lambda: ht.reference(TOP, START, []), "No times"),
         (lambda: ht.score([1], np.zeros((1, 9)), top=TOP, start=START), "states[0] has 9 numbers, not 6"),

@@ -145,7 +145,7 @@ def test_a_film_is_saved_as_gif(run, tmp_path) -> None:
         ht.plot.animate(run, tmp_path / "top.png")
     with pytest.raises(InputError, match="cannot be written"):
         ht.plot.animate(run, tmp_path / "none" / "top.gif", frames=1)
-    with pytest.raises(InputError, match="allows nothing"):
+    with pytest.raises(InputError, match="must be at least 1"):
         ht.plot.animate(run, frames=0)
 
 

@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import pytest
 
-from heavytop.errors import InputError, NotInClass
+from heavytop.errors import InputError
 from heavytop.exact.cases.bobylev_steklov import BobylevSteklov
 from heavytop.exact.closed_form import initial_xi
 from heavytop.top.heavy_top import HeavyTop, State
@@ -69,16 +69,7 @@ def test_turning_points_are_starts_like_any_other():
         assert_solves(motion_from(Fraction(2, 3), x, Fraction(4, 5), Fraction(0)), Fraction(5, 2))
 
 
-def test_what_is_outside_is_refused_with_the_test_that_failed():
-    start = State((1, 0, 1), (0, 1, 1))
-    with pytest.raises(NotInClass, match="P b = 1, P c = 0"):
-        BobylevSteklov(HeavyTop((2, 2, 1), 1, (1, 1, 0)), start)
-    with pytest.raises(NotInClass, match="I1 - 2 I3 = 1"):
-        BobylevSteklov(HeavyTop((3, 2, 1), 1, (1, 0, 0)), start)
-    with pytest.raises(NotInClass, match="Omega2 = 1/9"):
-        BobylevSteklov(HeavyTop((2, 2, 1), 1, (1, 0, 0)), State((1, "1/9", 1), (0, 1, 1)))
-    with pytest.raises(NotInClass, match="P a gamma3 - I3 Omega1 Omega3 = 1"):
-        BobylevSteklov(HeavyTop((2, 2, 1), 1, (1, 0, 0)), State((1, 0, 1), (0, 1, 2)))
+def test_a_builder_without_a_centre_is_refused():
     with pytest.raises(InputError, match="a = 0"):
         bobylev_steklov_motion((Fraction(1), Fraction(1)), Fraction(0), Fraction(1), Fraction(1), Fraction(1))
 

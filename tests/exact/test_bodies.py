@@ -179,11 +179,11 @@ def test_an_enclosure_that_ignores_the_rounding_misses_the_true_motion() -> None
     start = ht.State((1, 2, -3), attitude=ht.Attitude.quaternion(1, 0, 0, 0))
     true = BodyMotion(LOPSIDED, start).state(Fraction(2), 120)
     coarse = resolve(LOPSIDED, start, 40)
-    blind = coarse.given([midpoint(x) for x in Validated(coarse.top, coarse.start).state(Fraction(2), 120)])
+    blind = coarse.in_given_axes([midpoint(x) for x in Validated(coarse.top, coarse.start).state(Fraction(2), 120)])
     assert not contains(true, blind, Fraction(1, 10**25))
     honest = Validated(coarse.top, coarse.start, xi=coarse.xi, uncertainty=coarse.uncertainty)
     values = honest.state(Fraction(2), 12)
-    found = coarse.given([midpoint(x) for x in values])
+    found = coarse.in_given_axes([midpoint(x) for x in values])
     widest = max(map(radius, values)) * 2
     assert all(abs(midpoint(t) - x) <= widest for t, x in zip(true, found, strict=True))
 

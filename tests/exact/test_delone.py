@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from heavytop.errors import NotInClass, OutOfReach
+from heavytop.errors import OutOfReach
 from heavytop.exact.cases.delone import Delone, DeloneHomoclinic
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import (
@@ -63,20 +63,6 @@ def test_beside_the_permanent_rotation_every_digit_comes_out():
         motion = delone((Fraction(off), Fraction(1), Fraction(0)), Fraction(0), (0, Fraction(1, 2)), Fraction(1, 2))
         for time in (Fraction(2), Fraction(40)):
             assert_solves(motion, time)
-
-
-@pytest.mark.parametrize(
-    ("inertia", "centre", "omega", "message"),
-    [
-        ((2, 2, "3/4"), (1, 0, 0), (1, 0, 0), "I1 - 2 I3 = 1/2"),
-        ((2, 2, 1), (1, 0, "1/9"), (1, 0, 0), "1/9"),
-        ((2, 2, 1), (0, 0, 0), (1, 0, 0), "P r != 0"),
-        ((2, 2, 1), (1, 0, 0), (1, 1, 0), r"xi = \(-1, 2\)"),
-    ],
-)
-def test_what_is_outside_is_refused_with_the_test_that_failed(inertia, centre, omega, message):
-    with pytest.raises(NotInClass, match=message):
-        Delone(HeavyTop(inertia, 1, centre), State(omega, (1, 0, 0)))
 
 
 # |gamma| = 1: gamma1 = (3/5)^2/(3/5)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from heavytop.errors import InputError, NotInClass
+from heavytop.errors import InputError
 from heavytop.exact.cases.ershkov_partial import ErshkovPartial
 from heavytop.exact.cases.gyrostat import Gyrostat
 from heavytop.exact.cases.lagrange import Lagrange
@@ -18,28 +18,19 @@ from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, midpoint, radius, working_precision
 from heavytop.precision import cross, dot
 from heavytop.top.attitude import perpendicular
-from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
-from support.elliptic_helpers import (
-    assert_same,
-    assert_solves_its_equations,
-    assert_starts_there,
-    in_balls,
-    positive,
-    rational,
-    vector,
-)
+from support.proofs import assert_overlap, assert_solves, parameters, positive, rational, triple
 
 F = Fraction
 TINY = F(1, 10**30)
-BITS_50 = 167
+BITS_50, NARROW = 167, F(1, 10**50)
 POLE, BELOW, SIDE = (0, 0, 1), (0, 0, -1), (F(3, 5), 0, F(4, 5))
 
 
 def random_gyrostat(seed):
     rng = random.Random(seed)
     top = HeavyTop((positive(rng), positive(rng), positive(rng)), 1, (0, rational(rng), 0))
-    return Gyrostat(top, State(vector(rng), vector(rng)), rational(rng))
+    return Gyrostat(top, State(triple(rng), triple(rng)), rational(rng))
 
 
 def paper_gyrostat(seed):
@@ -56,7 +47,7 @@ def paper_gyrostat(seed):
 def random_lagrange(seed):
     rng = random.Random(seed)
     i1 = positive(rng)
-    return Lagrange(HeavyTop((i1, i1, positive(rng)), 1, (0, 0, rational(rng))), State(vector(rng), vector(rng)))
+    return Lagrange(HeavyTop((i1, i1, positive(rng)), 1, (0, 0, rational(rng))), State(triple(rng), triple(rng)))
 
 
 def lagrange(omega, gamma, i3=1, centre=1):
@@ -120,16 +111,14 @@ def test_the_residual_of_all_six_equations_is_a_narrow_ball_around_zero(family):
     rng = random.Random(77)
     for seed in range(50):
         motion = family(seed)
-        assert_starts_there(motion)
-        assert_solves_its_equations(motion, motion.parameters, rational(rng, 20))
+        assert_solves(motion, rational(rng, 20))
 
 
 @pytest.mark.parametrize("name", list(EDGES))
 def test_the_edges_of_every_regime_solve_the_equations_too(name):
     motion = EDGES[name]
-    assert_starts_there(motion)
     for time in (F(0), F(7, 5), F(-33, 2)):
-        assert_solves_its_equations(motion, motion.parameters, time)
+        assert_solves(motion, time)
 
 
 @pytest.mark.parametrize("name", list(EDGES))
@@ -138,7 +127,7 @@ def test_the_digits_asked_for_come_out_at_large_times(name, time):
     motion = EDGES[name]
     state = motion.state(time, BITS_50)
     more = motion.state(time, 260)
-    assert_same(state, more)
+    assert_overlap(state, more, NARROW)
     with working_precision(400):
         gamma, expected = state[3:], dot(motion.start.gamma, motion.start.gamma)
         assert dot(gamma, gamma).contains(ball(expected))
@@ -167,7 +156,7 @@ def test_the_attitude_stands_on_a_gamma_of_any_length(family, seed):
     moved = replace(motion, start=State(motion.start.omega, [3 * g for g in direction]))
     rotor = moved.rotor if family is random_gyrostat else None
     enclosed = Validated(moved.top, moved.start, moved.system, rotor=rotor, xi=perpendicular(direction))
-    assert_same(moved.attitude(time, 200), enclosed.attitude(time, 200))
+    assert_overlap(moved.attitude(time, 200), enclosed.attitude(time, 200), NARROW)
 
 
 def test_exact_separatrices_have_no_lattice_and_their_neighbours_have():
@@ -190,9 +179,9 @@ def test_steady_precession_keeps_its_inclination():
 
 def test_the_homoclinic_gyrostat_is_the_papers_partial_case():
     for time in (F(0), F(3, 2), F(-7), F(10**6), F(10**9)):
-        assert_same(EDGES["homoclinic"].state(time, 200), PARTIAL.state(time, 200))
+        assert_overlap(EDGES["homoclinic"].state(time, 200), PARTIAL.state(time, 200), NARROW)
     for time in (F(0), F(3, 2), F(-40)):
-        assert_solves_its_equations(PARTIAL, GYROSTAT.parameters(PARTIAL.top, PARTIAL.start), time)
+        assert_solves(PARTIAL, time)
 
 
 def vectors():
@@ -219,7 +208,7 @@ def test_the_attitude_is_a_fixed_unit_vector_across_gamma(name):
         before, here, after = (motion.attitude(time + k * step, bits) for k in (-1, 0, 1))
         state = motion.state(time, bits)
         with working_precision(bits):
-            omega = motion.system.angular_velocity(in_balls(motion.parameters), state)
+            omega = motion.system.angular_velocity(parameters(motion), state)
             for a, b, slope in zip(before, after, cross(here, omega), strict=True):
                 assert abs((b - a) / ball(2 * step) - slope) < 1e-40
             assert abs(dot(here, here) - 1) < 1e-60
@@ -227,10 +216,6 @@ def test_the_attitude_is_a_fixed_unit_vector_across_gamma(name):
 
 
 def test_starts_outside_the_class_say_which_test_failed():
-    with pytest.raises(NotInClass, match="I1 - I2 = 1"):
-        Lagrange(HeavyTop((2, 1, 1), 1, (0, 0, 1)), State(POLE, POLE))
-    with pytest.raises(NotInClass, match="P a = 1"):
-        Lagrange(HeavyTop((2, 2, 1), 1, (1, 0, 1)), State(POLE, POLE))
     with pytest.raises(InputError, match="parallel"):
         Gyrostat.of(HeavyTop((3, 2, 1), 1, (0, 1, 0)), State((1, 2, 3), SIDE))
     with pytest.raises(InputError, match="zero vector"):
@@ -250,4 +235,4 @@ def test_the_validated_integration_agrees_to_fifty_digits(make, seed):
     motion = make(1000 + seed)
     time = F(-10, 3) if seed % 2 else F(5, 2)
     enclosed = Validated(motion.top, motion.start, motion.system, rotor=F(motion.parameters.rotor))
-    assert_same(motion.state(time, 200), enclosed.state(time, 200))
+    assert_overlap(motion.state(time, 200), enclosed.state(time, 200), NARROW)

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from heavytop.errors import NotInClass
 from heavytop.exact.cases.euler import Euler
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational, triple
@@ -81,8 +80,3 @@ def test_a_body_at_rest_stays_at_rest():
     motion = euler((3, 2, 1), (0, 0, 0))
     assert [int(w.unique_fmpz()) for w in motion.state(Fraction(10**9), 100)[:3]] == [0, 0, 0]
     assert_solves(motion, Fraction(5))
-
-
-def test_a_moment_of_the_weight_is_refused_with_its_value():
-    with pytest.raises(NotInClass, match=r"P r = \(0, 3/2, 0\)"):
-        Euler(HeavyTop((3, 2, 1), 3, (0, "1/2", 0)), State((1, 0, 0), (0, 0, 1)))

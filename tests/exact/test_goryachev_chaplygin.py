@@ -94,18 +94,6 @@ def test_a_thousand_digits_come_out():
     assert_narrow(motion_from((F(1), F(0)), ("3/4", "1/2", 0), UP), F(10**6), 1000)
 
 
-def test_what_is_outside_is_refused_with_the_test_that_failed():
-    start = State(("3/4", "1/2", 0), UP)
-    with pytest.raises(NotInClass, match="I1 - 4 I3 = -1"):
-        GoryachevChaplygin(HeavyTop((3, 3, 1), 1, (1, 0, 0)), start)
-    with pytest.raises(NotInClass, match="P c = 1"):
-        GoryachevChaplygin(HeavyTop((4, 4, 1), 1, (1, 0, 1)), start)
-    with pytest.raises(NotInClass, match="M·gamma = 1/7"):
-        motion_from((F(1), F(0)), ("3/4", "1/2", "1/7"), UP)
-    with pytest.raises(NotInClass, match=r"gamma = \(0, 0, 0\)"):
-        motion_from((F(1), F(0)), ("3/4", "1/2", "1/7"), (0, 0, 0))
-
-
 @pytest.mark.parametrize("power", [11, 20, 40, 120])
 def test_levels_too_near_to_one_that_is_not_done_are_left_to_the_enclosure(power):
     step, top = F(1, 10**power), HeavyTop((4, 4, 1), 1, (1, 0, 0))

@@ -138,20 +138,6 @@ def test_a_thousand_digits_and_fifty_at_a_million_are_quick():
     assert process_time() - begun < 1
 
 
-def test_what_is_outside_is_refused_with_the_test_that_failed():
-    for top, start, message in (
-        (TOP, State((1, 0, 0), (1, 0, 0)), "M·gamma = 4"),
-        (TOP, State((1, 0, 1), (0, 1, 0)), "G = 1"),
-        (TOP, State((0, 2, 0), (F(4, 5), 0, F(3, 5))), r"h\^2 <="),
-        (TOP, State((0, 0, "1/3"), (F(4, 5), F(3, 5), 0)), "off axis 3"),
-        (TOP, State((0, 0, 0), (F(4, 5), F(3, 5), 0)), "off axis 3"),
-        (TOP, State((0, 0, 0), (1, 0, 0)), "off axis 3"),
-        (HeavyTop((4, 4, 2), 1, (1, 0, 0)), State((0, 0, 0), UNIT), "I1 - 4 I3 = -4"),
-    ):
-        with pytest.raises(NotInClass, match=message):
-            GoryachevChaplyginRest(top, start)
-
-
 @pytest.mark.parametrize("start", [State((0, 0, 0), UNIT), moving(1).start, *TENDING])
 def test_the_general_class_refuses_these_levels(start):
     with pytest.raises(NotInClass, match="both separated variables"):

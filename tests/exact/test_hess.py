@@ -163,25 +163,6 @@ def test_more_turns_than_a_word_counts():
     assert_narrow(motion, F(7, 3))
 
 
-def test_what_is_outside_is_refused_with_the_test_that_failed():
-    start = State(("3/4", "1/2", -1), (0, 1, 0))
-    for case in (Hess, HessPendulum):
-        with pytest.raises(NotInClass, match="P b = 1"):
-            case(HeavyTop((8, 6, 3), 1, (1, 1, 2)), start)
-        with pytest.raises(NotInClass, match="the difference = -20/3"):
-            case(HeavyTop((8, "17/3", 3), 1, (1, 0, 2)), start)
-        with pytest.raises(NotInClass, match="M·P r = 3"):
-            case(TOP, State(("9/8", "1/2", -1), (0, 1, 0)))
-        with pytest.raises(NotInClass, match=r"gamma = \(0, 0, 0\)"):
-            case(TOP, State(start.omega, (0, 0, 0)))
-    with pytest.raises(NotInClass, match="M·gamma = 3"):
-        HessPendulum(TOP, start)
-    with pytest.raises(NotInClass, match="M·gamma = 0"):
-        Hess(TOP, State(("3/4", 0, -1), (0, 1, 0)))
-    with pytest.raises(NotInClass, match="off axis 2"):
-        HessPendulum(TOP, State((0, 3, 0), (1, 0, 1)))
-
-
 @pytest.mark.parametrize("lift", [F(1, 10), F(1, 10**12), F(-1, 10**30)])
 def test_heights_that_all_but_rest_are_levels_like_any_other(lift):
     # at lift 0 the cubic has a double root at s = −1: the spherical pendulum goes round level

@@ -5,7 +5,6 @@ from fractions import Fraction
 
 import pytest
 
-from heavytop.errors import NotInClass
 from heavytop.exact.cases.lagrange import LagrangeGyrostat
 from heavytop.top.equations import HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
@@ -33,14 +32,3 @@ def test_every_random_motion_solves_all_six_equations(seed, weight):
     motion = random_motion(seed, weight)
     assert_exact(motion, seed, attitude=True)
     assert_enclosed(motion, HEAVY_GYROSTAT)
-
-
-def test_what_is_outside_is_refused():
-    start = State((1, 2, 3), ("3/5", 0, "4/5"))
-    for top, cause in (
-        (HeavyTop((2, 2, 1), 1, (0, 0, 1), (1, 0, 1)), "k1 = 1"),
-        (HeavyTop((2, 3, 4), 1, (0, 0, 1), (0, 0, 1)), "I1 - I2"),
-        (HeavyTop((2, 2, 1), 1, (1, 0, 1), (0, 0, 1)), "P a = 1"),
-    ):
-        with pytest.raises(NotInClass, match=cause):
-            LagrangeGyrostat(top, start)

@@ -5,7 +5,6 @@ from fractions import Fraction
 
 import pytest
 
-from heavytop.errors import NotInClass
 from heavytop.exact.cases.pendulum import Pendulum
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational, triple
@@ -64,23 +63,3 @@ def test_a_separatrix_with_irrational_length_is_found_exactly():
     motion = pendulum(0, 2, (2, -2), (1, 1), (4, 3, 2))
     assert_solves(motion, Fraction(3))
     assert_solves(motion, Fraction(1000))
-
-
-@pytest.mark.parametrize(
-    ("omega", "gamma", "centre", "message"),
-    [
-        ((1, 1, 0), (0, 0, 1), (0, 1, 0), r"along a principal axis, but I e x e = \(0, 0, 1\)"),
-        ((1, 0, 0), ("3/5", 0, "4/5"), (0, 1, 0), r"P r·e = 0, gamma·e = 3/5"),
-        ((1, 0, 0), (0, 0, 1), ("1/7", 1, 0), r"P r·e = 1/7, "),
-        (
-            (0, 0, 0),
-            ("3/5", 0, "4/5"),
-            (0, 1, 0),
-            r"at rest, along a principal axis, but I e x e = \(0, 3/2, 0\)",
-        ),
-        ((1, 0, 0), (0, 0, 1), (0, 0, 0), r"P r != 0"),
-    ],
-)
-def test_a_start_outside_is_refused_with_the_test_that_failed(omega, gamma, centre, message):
-    with pytest.raises(NotInClass, match=message):
-        Pendulum(HeavyTop((3, 2, 1), 1, centre), State(omega, gamma))

@@ -6,7 +6,7 @@ from fractions import Fraction
 import pytest
 from flint import fmpq_mpoly_ctx
 
-from heavytop.errors import LevelNotDone, NotInClass
+from heavytop.errors import LevelNotDone
 from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplygin, Sretensky
 from heavytop.exact.catalogue import find
 from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
@@ -121,13 +121,3 @@ def test_the_pendulum_about_the_rotors_axis_is_left_to_the_enclosure():
     """Ω1 = Ω2 = γ3 = 0: a separated variable rests at 0."""
     with pytest.raises(LevelNotDone, match="rests at 0"):
         motion_from((F(1), F(0)), 2, (F(0), F(0), F(1)), (F(3, 5), F(4, 5), 0))
-
-
-def test_what_is_outside_is_refused_with_the_test_that_failed():
-    start = State(("3/4", "1/2", -1), (0, 0, 1))
-    with pytest.raises(NotInClass, match="k1 = k2 = 0, but k1 = 0, k2 = 1"):
-        Sretensky(HeavyTop((4, 4, 1), 1, (1, 0, 0), (0, 1, 1)), start)
-    with pytest.raises(NotInClass, match="I1 - 4 I3 = -1"):
-        Sretensky(HeavyTop((3, 3, 1), 1, (1, 0, 0), (0, 0, 1)), start)
-    with pytest.raises(NotInClass, match="M·gamma = -1"):
-        Sretensky(HeavyTop((4, 4, 1), 1, (1, 0, 0), (0, 0, 0)), start)

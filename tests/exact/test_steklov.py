@@ -68,18 +68,7 @@ def test_nearly_equal_moments_do_no_harm(distance):
     assert_narrow(motion, F(10**6))
 
 
-def test_what_is_outside_is_refused_with_the_test_that_failed():
-    top, start = HeavyTop((1, "7/16", "3/4"), 1, ("45/32", 0, 0)), State((0, 4, 2), (-1, 0, 0))
-    with pytest.raises(NotInClass, match="P b = 0, P c = 1"):
-        Steklov(HeavyTop(top.inertia, 1, (1, 0, 1)), start)
-    with pytest.raises(NotInClass, match="I1, I2, I3 different"):
-        Steklov(HeavyTop((1, "1/2", "3/4"), 1, (1, 0, 0)), start)
-    with pytest.raises(NotInClass, match=r"Omega3\^2 = .*, but the difference = 9/4"):
-        Steklov(top, State((0, 4, "5/2"), start.gamma))
-    with pytest.raises(NotInClass, match=r"gamma as .*, but the difference = \(2, 0, 0\)"):
-        Steklov(top, State(start.omega, (1, 0, 0)))
-    with pytest.raises(NotInClass, match=r"gamma = \(0, 0, 0\)"):
-        Steklov(top, State(start.omega, (0, 0, 0)))
+def test_moments_of_no_such_top_are_refused():
     with pytest.raises(InputError, match="No Steklov top has moments"):
         steklov_motion(F(1), F(1, 2), F(1), F(1))
 

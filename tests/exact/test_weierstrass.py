@@ -196,14 +196,6 @@ def test_known_quartics_have_their_elementary_motions():
         is_zero(motion.position(point, 1 / motion.denominator(point)) - expected)
 
 
-def test_irrational_starts_come_as_balls():
-    coefficients = (Fraction(2), Fraction(0), Fraction(-3), Fraction(0), Fraction(1, 2))
-    motion = QuarticMotion(coefficients, Fraction(0), arb(2).sqrt()).prepared()
-    point = motion.lattice.point(Fraction(3), 2)
-    x = motion.position(point, 1 / motion.denominator(point))
-    is_zero(x[1] ** 2 - (2 - 3 * x[0] ** 2 + x[0] ** 4 / 2))
-
-
 CLOSE = [Fraction(1, 10**3000), Fraction(1, 7), Fraction(10**3000)]
 
 

@@ -6,7 +6,7 @@ from fractions import Fraction
 import pytest
 
 import heavytop as ht
-from heavytop.errors import LevelNotDone, NotInClass
+from heavytop.errors import LevelNotDone
 from heavytop.exact.cases.gyrostat import Gyrostat
 from heavytop.exact.cases.zhukovsky_volterra import ZhukovskyVolterra
 from heavytop.exact.catalogue import find
@@ -129,8 +129,3 @@ def test_limits_are_refused_by_name_and_enclosed(inertia, rotor):
     with pytest.raises(LevelNotDone, match="aperiodic, or that of a symmetric top"):
         ZhukovskyVolterra(top, START)
     assert ht.reference(top, START, [1], 20).states
-
-
-def test_a_weight_is_refused():
-    with pytest.raises(NotInClass, match="needs P r = 0"):
-        ZhukovskyVolterra(HeavyTop((3, 2, 1), 1, (0, 0, 1), (1, 0, 0)), START)

@@ -23,6 +23,7 @@ from heavytop.harness.plan import read
 from heavytop.records import Row
 from heavytop.report.compare.noise import Policy
 from support.helpers import without_progress
+from support.in_process import heavytop
 from support.midpoint import MIDPOINT
 from support.reports import all_good, compare, failed_row, rows
 
@@ -116,8 +117,7 @@ def ended(process: int) -> bool:
 def test_rows_that_do_not_end_are_ended_and_all_others_are_measured(tmp_path: Path) -> None:
     names = ("mine.py:solve", "mine.py:stuck", "silent", "mine.py:leaves", "mine.py:interrupts")
     file = plan(tmp_path, *names)
-    line = [sys.executable, "-m", "heavytop", "run", "--plan", str(file), "--out", str(tmp_path / "out")]
-    done = subprocess.run([*line, "--workers", "1"], capture_output=True, text=True, timeout=240, check=False)
+    done = heavytop("run", "--plan", file, "--out", tmp_path / "out", "--workers", "1")
     assert (done.returncode, without_progress(done.stderr)) == (3, "")
     report = json.loads((tmp_path / "out" / "report.json").read_text())
     outcomes = {row["integrator"]: row["outcome"] for row in report["rows"]}
@@ -174,15 +174,9 @@ def test_what_an_integrator_declares_that_it_cannot_do_is_no_failure(tmp_path: P
         found = compare(baseline, candidate, Policy())
         assert (found.verdict, found.exit_code) == (verdict, code)
         assert compare(baseline, candidate, Policy(), list_same=False).verdict == verdict
-    failed = ht.Report("heavytop-report/2", {}, {}, [replace_outcome(lost.rows[0], "failed")])
+    failed = ht.Report("heavytop-report/2", {}, {}, [msgspec.structs.replace(lost.rows[0], outcome="failed")])
     for pair in ((failed, lost), (lost, failed)):
         assert compare(*pair, Policy()).exit_code == 3
-
-
-def replace_outcome(row, outcome: str):
-    import msgspec
-
-    return msgspec.structs.replace(row, outcome=outcome)
 
 
 def test_an_end_is_named_by_its_signal_or_its_exit_code() -> None:

@@ -304,7 +304,7 @@ def toml(folder: Path, extra: str = "", table: str = TABLE) -> Path:
     [
         ('colour = "red"', "unknown field `colour`"),
         ("folder = 'x'", "unknown field `folder`"),
-        ('setting = "speed"', "setting"),
+        ('setting = "speed"', "setting = 'speed': step, tolerance or none"),
         ("timeout = 0", "timeout = 0"),
         ("timeout = nan", "timeout"),
         ('timeout = "soon"', "soon"),

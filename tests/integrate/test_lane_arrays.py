@@ -10,9 +10,10 @@ from heavytop.harness.sweeps import Random
 from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.integrate.heyoka.engines import arrays
 from heavytop.integrate.heyoka.lanes import states_on_a_grid
-from heavytop.integrate.multiword.lanes import Numerators, double_double_states
+from heavytop.integrate.multiword.lanes import double_double_states
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.truth import Known, known_motion
+from heavytop.multiword.pairs import Numerators
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, exact
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State

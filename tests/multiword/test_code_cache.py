@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +11,7 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.multiword.codegen import code_cache
-from heavytop.multiword.codegen.machine_code import DOUBLES, POINTER, Machine, compiled, function, ir, once, pointer
+from heavytop.multiword.codegen.machine_code import POINTER, Machine, compiled, function, ir, once, pointer
 
 CHANGES: dict[str, Callable[[bytes], bytes]] = {
     "empty": lambda _: b"",
@@ -39,7 +38,7 @@ def thrice(calls: list[int]) -> Callable[[int], Machine]:
         (vector,) = code.arguments
         code.store(code.load(vector, 0) * float(factor), vector, 0)
         code.builder.ret_void()
-        return compiled(module, {"multiply": (None, [DOUBLES])})
+        return compiled(module)
 
     return once(make)
 
@@ -137,4 +136,4 @@ def test_the_folder_does_not_grow_without_end(folder: Path, monkeypatch: pytest.
 
 def test_signatures_come_back(folder: Path) -> None:
     first = thrice([])(3)
-    assert thrice([])(3).signatures == first.signatures == {"multiply": (None, [ctypes.POINTER(ctypes.c_double)])}
+    assert thrice([])(3).signatures == first.signatures == {"multiply": ["void", "double*"]}

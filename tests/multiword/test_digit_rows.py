@@ -1,6 +1,5 @@
 """Digits: sums of products against integers, digits of words, and steps against integers."""
 
-import ctypes
 from fractions import Fraction
 from random import Random
 from typing import Any
@@ -10,10 +9,8 @@ import pytest
 from llvmlite import ir
 
 from heavytop.multiword.codegen.machine_code import (
-    DOUBLES,
     INT,
     INT_POINTER,
-    INTEGERS,
     LANES,
     POINTER,
     Machine,
@@ -42,8 +39,7 @@ def sums_code(wide: bool) -> Machine:
     _, code = function(module, "sums", ir.VoidType(), [POINTER, POINTER, INT_POINTER, INT, INT, POINTER])
     code.call(written, code.arguments)
     code.builder.ret_void()
-    integer = ctypes.c_int64
-    return compiled(module, {"sums": (None, [DOUBLES, DOUBLES, INTEGERS, integer, integer, DOUBLES])})
+    return compiled(module)
 
 
 def known_sums(rows: numpy.ndarray, starts: tuple[list[int], list[int]], levels: int) -> list[int]:
@@ -130,7 +126,7 @@ def conversion(grid: Grid) -> Machine:
         for k, value in enumerate(rows._digits(values) if name == "digits" else rows._words(values)):
             code.store(value, to, LANES * k)
         code.builder.ret_void()
-    return compiled(module, {name: (None, [DOUBLES, DOUBLES]) for name in ("digits", "words")})
+    return compiled(module)
 
 
 @pytest.mark.slow

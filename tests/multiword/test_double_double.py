@@ -1,6 +1,5 @@
 """Double-double steps: the same bits on every processor, n0 that follows the motion, elementary functions by bits."""
 
-import ctypes
 import math
 from fractions import Fraction
 from functools import cache
@@ -12,7 +11,6 @@ from llvmlite import ir
 
 from heavytop.multiword.codegen.machine_code import (
     DOUBLE,
-    DOUBLES,
     POINTER,
     Processor,
     compiled,
@@ -90,7 +88,7 @@ def test_a_constant_times_a_number_has_the_nearest_high_word() -> None:
     for k, word in enumerate(words):
         code.store(word, result, 8 * k)
     code.builder.ret_void()
-    machine = compiled(module, {"product": (None, [DOUBLES] * 3)})
+    machine = compiled(module)
     random, unit = Random(1), 2.0**-53
     for c in (Fraction(text) for text in ("2/5", "-3/20", "5/6", "1/3", "-3/7", "4/9", "17/21", "1/2")):
         constants, found = doubles(24), doubles(16)
@@ -158,7 +156,7 @@ def elementary(name: str):
     _, code = function(module, "f", DOUBLE, [DOUBLE])
     (given,) = code.arguments
     code.builder.ret(log2(given) if name == "log2" else power_of_two(code, given, 6, 10))
-    machine = compiled(module, {"f": (ctypes.c_double, [ctypes.c_double])})
+    machine = compiled(module)
     return machine, machine.functions["f"]
 
 

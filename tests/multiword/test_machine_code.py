@@ -1,6 +1,5 @@
 """Formulas of the machine code: what they compute is what the same formulas are of numbers."""
 
-import ctypes
 from operator import add, and_, eq, ge, gt, le, lshift, lt, mul, ne, or_, rshift, sub, truediv, xor
 
 import numpy
@@ -9,7 +8,6 @@ from llvmlite import ir
 
 from heavytop.multiword.codegen.machine_code import (
     DOUBLE,
-    DOUBLES,
     INT,
     POINTER,
     Operand,
@@ -40,8 +38,7 @@ def value_of(formula, kind: ir.Type, a, b):
     _, code = function(module, "f", kind, [kind, kind])
     found = formula(*code.arguments)
     code.builder.ret(code.select(found, *((1.0, 0.0) if kind is DOUBLE else (1, 0))) if is_flag(found) else found)
-    python = ctypes.c_double if kind is DOUBLE else ctypes.c_int64
-    machine = compiled(module, {"f": (python, [python, python])})
+    machine = compiled(module)
     return machine.functions["f"](a, b)
 
 
@@ -71,7 +68,7 @@ def test_formulas_of_eight_doubles() -> None:
         flag = value.type == ir.VectorType(ir.IntType(1), 8)
         code.store(code.select(value, 1.0, 0.0) if flag else value, result, 8 * k)
     code.builder.ret_void()
-    machine = compiled(module, {"f": (None, [DOUBLES] * 3)})
+    machine = compiled(module)
     arrays = doubles(8), doubles(8), doubles(8 * len(found))
     arrays[0][:5], arrays[1][:5] = zip(*PAIRS, strict=True)
     arrays[1][5:] = 1.0

@@ -17,7 +17,7 @@ DIGITS_60 = 200
 
 def parameters(solution):
     """The parameters of the solution's field as balls at the working precision."""
-    exact = solution.system.parameters(solution.top, solution.start)
+    exact = getattr(solution, "parameters", None) or solution.system.parameters(solution.top, solution.start)
     return exact.mapped(lambda value: ball(Fraction(value)))
 
 
@@ -140,6 +140,7 @@ def assert_enclosed(motion, system=HEAVY_TOP):
         assert_overlap(motion.state(time, 180), enclosure.state(time, 180))
 
 
-def assert_overlap(balls, others):
-    """As many balls, each of which meets its counterpart."""
+def assert_overlap(balls, others, limit=None):
+    """As many balls, each of which meets its counterpart and has a radius below the limit."""
     assert all(ball.overlaps(other) for ball, other in zip(balls, others, strict=True))
+    assert limit is None or max(map(radius, balls)) < limit

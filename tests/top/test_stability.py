@@ -72,8 +72,9 @@ def test_verdict_and_rate_are_those_of_the_eigenvalues(first: int) -> None:
         assert found is not None
         largest = growth(top, start, system)
         # a double eigenvalue has half of the digits, one that is sixfold ten of them
-        assert (found.verdict == "unstable") == (largest > 1e-8)
-        if found.verdict == "unstable":
+        assert bool(found.rate) == (largest > 1e-8)
+        assert (found.verdict == "unstable") == bool(found.rate or found.drift)
+        if found.rate:
             assert found.rate == pytest.approx(float(largest), rel=1e-12)
         verdicts.add(found.verdict)
     assert verdicts == {"stable", "unstable", "spectrally stable"}
@@ -114,10 +115,32 @@ def test_a_regular_precession_is_stable_and_other_motions_are_none() -> None:
     assert of(CASES["gyrostat"].top, CASES["gyrostat"].start, GYROSTAT) is None
 
 
-def test_about_an_axis_between_two_equal_moments_omega_drifts_away() -> None:
-    found = of(ht.HeavyTop((2, 2, 1), 0, (0, 0, 0)), ht.State((3, 4, 0), (0, 0, 1)))
-    assert found is not None
-    assert found.verdict == "spectrally stable"
+@pytest.mark.parametrize("axes", [(0, 1, 2), (1, 2, 0), (2, 0, 1)])
+@pytest.mark.parametrize("rotor", [Fraction(0), Fraction(3, 5)])
+def test_about_an_axis_between_two_equal_moments_omega_drifts_away(rotor: Fraction, axes: tuple[int, ...]) -> None:
+    """Moments 2, 2, 1: Ω = (3, 4, Ω3) turns by the angle (Ω3 + k3)/2 t; beside the steady Ω3 = -k3 by ε t/2."""
+
+    def renamed(*vector: object) -> list[object]:
+        return [vector[axis] for axis in axes]
+
+    off, time = Fraction(1, 1000), Fraction(1000)
+    system = HEAVY_GYROSTAT if rotor else HEAVY_TOP
+    top = ht.HeavyTop(renamed(2, 2, 1), 0, (0, 0, 0), renamed(0, 0, rotor) if rotor else None)
+    steady_motion = of(top, ht.State(renamed(3, 4, rotor), (0, 0, 1)), system)
+    assert steady_motion is not None
+    assert (steady_motion.verdict, steady_motion.rate, steady_motion.drift) == ("unstable", 0, 0.5)
+    assert "turns it away linearly, by 0.5 ε t" in steady_motion.text()
+    beside = ht.reference(top, ht.State(renamed(3, 4, rotor + off), (0, 0, 1)), [time], digits=12, system=system)
+    omega = [float(beside.states[0][axes.index(k)].value) for k in range(2)]
+    turned = complex(*omega) / complex(3, 4)
+    assert abs(mpmath.arg(turned)) == pytest.approx(steady_motion.drift * off * time)
+    assert of(top, ht.State(renamed(3, 4, rotor + off), (0, 0, 1)), system) is None
+
+
+def test_omega_of_a_spherical_body_stays() -> None:
+    steady_motion = of(ht.HeavyTop((2, 2, 2), 0, (0, 0, 0)), ht.State((3, 4, 0), (0, 0, 1)))
+    assert steady_motion is not None
+    assert steady_motion.drift == 0
 
 
 def test_sentence_attribute_and_key_say_the_same() -> None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from heavytop import arguments
 from heavytop.arguments import Number, Numbers
 from heavytop.display import Tabular, TitledTable
-from heavytop.errors import InputError, prefixed, quoted
+from heavytop.errors import InputError, meant, prefixed, quoted
 from heavytop.exact.bodies import Finder
 from heavytop.exact.catalogue import find
 from heavytop.exact.enclosure.run import EFFORT
@@ -347,7 +347,7 @@ def _checked_names(options: Mapping[str, Any]) -> dict[str, Any]:
     """Every option in order, None where it was not given; TypeError for any other name, as Python raises it."""
     for name in options:
         if name not in _OPTIONS:
-            raise TypeError(f"got an unexpected keyword argument {name!r}")
+            raise TypeError(f"unexpected keyword argument {name!r}. {meant(name, _OPTIONS)}Use {', '.join(_OPTIONS)}.")
     return {name: options.get(name) for name in _OPTIONS}
 
 

@@ -163,8 +163,11 @@ def prepare(
     with_parquet: bool = False,
     integrator: Any = "",
     row_timeout: Any = None,
+    clear: Callable[[Path], object] | None = None,
 ) -> PlannedRun:
     """The run of a plan into the folder ``out``, by default a new one under heavytop-results; nothing is written yet.
+
+    clear: called on that folder once all else is in order.
 
     Raises InputError for an impossible plan, a folder that is not fit, and options that contradict each other.
     """
@@ -193,6 +196,8 @@ def prepare(
         with_parquet,
         None if timeout is None else seconds_of(timeout, "--row-timeout" if row_timeout is not None else "row_timeout"),
     )
+    if clear is not None:
+        clear(run.directory)
     if not run.is_finished:
         require_fit(run.directory, resume)
     return run

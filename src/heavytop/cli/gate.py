@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 @command
 def gate(
     plan: Annotated[str, typer.Option(help="A TOML file, or a name of `heavytop list` such as gate.")] = "gate.toml",
-    integrator: Annotated[str, typer.Option(help="As of `run`: a name, mine.toml, mine.py:solve.")] = "",
+    integrator: Annotated[str, typer.Option(help="As for `run`: a name, mine.toml, mine.py:solve.")] = "",
     baseline: Annotated[Path, typer.Option(help="Folder of the trusted report.")] = Path(".heavytop/baseline"),
-    policy: Annotated[Path | None, typer.Option(help="As of `compare`; policy.toml beside the plan if any.")] = None,
+    policy: Annotated[Path | None, typer.Option(help="As for `compare`; policy.toml beside the plan if any.")] = None,
     out: Annotated[Path, typer.Option(help="Folder of the new report; a former one there is replaced.")] = Path(
         ".heavytop/new"
     ),
@@ -48,11 +48,14 @@ def gate(
 
     require_apart((markdown, junit, html), baseline, out, policy)
     trusted, fresh, rules = absolute(baseline), absolute(out), policy_of(plan, policy)
-    clear(fresh)
-    planned = prepare(plan, fresh, integrator=integrator, workers=workers)
     command_line = join(["heavytop", *sys.argv[1:], "--bless"])
-    if not bless:
-        require_baseline(trusted, command_line)
+
+    def make_room(folder: Path) -> None:
+        if not bless:
+            require_baseline(trusted, command_line)
+        clear(folder)
+
+    planned = prepare(plan, fresh, integrator=integrator, workers=workers, clear=make_room)
     say_former({integrator} | former(plan))
     for warning in planned.warnings:
         say(f"warning: {warning}")

@@ -17,7 +17,7 @@ import typer
 
 from heavytop.cli.app import Json, command, numbers, print_json, show_on_terminal, writing
 from heavytop.cli.output import reaching, say, say_former, watched
-from heavytop.errors import ExitCode, InputError
+from heavytop.errors import ExitCode, InputError, options_named
 from heavytop.features import FEATURES
 from heavytop.files import replace
 
@@ -237,7 +237,11 @@ def _of_a_motion(function: Callable[..., int]) -> Callable[..., int]:
     here, the 25 shared options would stand in both commands.
     """
 
+    names = {name: name for name in (*_SHARED, *signature(function).parameters)} | {"step_limit": "max_steps"}
+    named = {name: f"--{option.replace('_', '-')}" for name, option in names.items()}
+
     @wraps(function)
+    @options_named(named)
     def with_options(times: str, **options: Any) -> int:
         shared = _Options(**{name: options.pop(name) for name in _SHARED})
         further = [kind(**{name: options.pop(name) for name in kind._fields}) for kind in _FURTHER]
@@ -277,12 +281,14 @@ def propagate(
     Numbers are exact: 3, 0.25, 1e-3, -2/5.
     """
     from heavytop.api.motions import motion as computed_motion
+    from heavytop.integrate.registry import compiles
     from heavytop.report.render.motion import motion_text, of_motion
 
     say_former([integrator])
     _warn_of_cost(precision, integrator)
     settings: dict[str, Any] = {"integrator": integrator, "tolerance": tolerance, "step_limit": max_steps}
-    with reaching("integration", _PROPAGATE_SECONDS) as reach:
+    what = "compiling, at the first call, then integration" if compiles(integrator) else "integration"
+    with reaching(what, _PROPAGATE_SECONDS) as reach:
         motion = computed_motion(
             asked.top,
             asked.start,

@@ -208,12 +208,16 @@ def run(
         ),
     ] = "default",
     integrator: Annotated[str, typer.Option(help="Measure it beside heyoka: a name, mine.toml, mine.py:solve.")] = "",
-    out: Annotated[Path | None, typer.Option(help="New folder for the report.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="New folder DIR for the report, else heavytop-results/PLAN-TIME.")
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the run that --out holds.")] = False,
     workers: Annotated[int | None, typer.Option(help="Local processes; as many as there are processors.")] = None,
     scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to run on instead.")] = None,
     parquet: Annotated[bool, typer.Option("--parquet", help="Write DIR/rows.parquet too.")] = False,
-    seed: Annotated[int, typer.Option(help="Seed of the roundings of the same motions, 0 to 1000.")] = 0,
+    seed: Annotated[
+        int, typer.Option(help="0 to 1000; another seed: the same motions with other rounding errors.")
+    ] = 0,
     row_timeout: Annotated[
         str | None, typer.Option(help="Seconds of a row of a third-party integrator, at most.", metavar="SECONDS")
     ] = None,

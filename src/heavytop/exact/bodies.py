@@ -84,9 +84,9 @@ class BodyMotion:
         ξ starts at the first row of the attitude given, or at :func:`heavytop.top.attitude.perpendicular` of γ.
         Raises OutOfReach where it cannot be proven, InputError for |γ| ≠ 1 where no attitude was given.
         """
-        return list(self.whole(time, bits)[1](time, bits))
+        return list(self.known_attitude(time, bits)[1](time, bits))
 
-    def whole(self, latest: Fraction, bits: int) -> tuple[str, Whole]:
+    def known_attitude(self, latest: Fraction, bits: int) -> tuple[str, Whole]:
         """How the attitude is known, and Ω, γ, ξ at (time, bits) as :meth:`with_attitude` gives them.
 
         The closed form of the attitude is taken where it gives so many bits at the time ``latest``.

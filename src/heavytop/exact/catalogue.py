@@ -208,12 +208,12 @@ def state_and_attitude(
         return solution.method, solution.with_attitude
     own: Attitude | None = getattr(solution, "own_attitude", getattr(solution, "attitude", None))
     if own is not None:
-        whole = Turned(solution, own)
+        turned = Turned(solution, own)
         try:
-            whole(latest, bits)
+            turned(latest, bits)
         except (NotInClass, OutOfReach):
             pass
         else:
-            return solution.method, whole
+            return solution.method, turned
     enclosure = Validated(solution.top, solution.start, solution.system, effort=effort)
     return enclosure.method, lambda time, bits: [*solution.state(time, bits), *enclosure.attitude(time, bits)]

@@ -139,6 +139,35 @@ def instant(time: Fraction) -> Any:
     return ball(time) if current_length() == 1 else arb_series([ball(time), 1], prec=current_length())
 
 
+def solved(start: Sequence[arb], rates: Callable[[list[Any]], Sequence[Any]]) -> list[Any]:
+    """The power series with y' = rates(y) from ``start``, of the length set by :func:`series_length`; numbers for 1.
+
+    By Picard's iteration, each of which makes one coefficient more.
+    """
+    length = current_length()
+    if length == 1:
+        return list(start)
+    series = [arb_series([value], prec=length) for value in start]
+    for _ in range(length - 1):
+        series = [value + arb_series(rate).integral() for value, rate in zip(start, rates(series), strict=True)]
+    return series
+
+
+def in_units(motion: Sequence[Any], rate: Fraction, size: Fraction) -> list[Any]:
+    """Ω and γ, series in t' or numbers, as those in t = t'/rate of Ω times ``rate`` and γ times ``size``.
+
+    Of the length set by :func:`series_length`, whatever that of the series is; numbers for 1.
+    """
+    units, length = [ball(rate)] * 3 + [ball(size)] * 3, current_length()
+    if length == 1:
+        return [unit * constant(component) for unit, component in zip(units, motion, strict=True)]
+    factors = [ball(rate**n) for n in range(length)]
+    return [
+        arb_series([unit * factor * component[n] for n, factor in enumerate(factors)], prec=length)
+        for unit, component in zip(units, motion, strict=True)
+    ]
+
+
 def unit(angle: Any) -> BallLike:
     """e^(i angle) of a number or series."""
     sine, cosine = angle.sin_cos()
@@ -369,18 +398,18 @@ class Turned:
         return rotation
 
 
-def starting_at(xi: Vector, gamma: Vector, whole: Attitude) -> Attitude:
+def starting_at(xi: Vector, gamma: Vector, known: Attitude) -> Attitude:
     """Ω, γ, ξ with ξ(0) = ``xi`` out of those with ξ(0) = :func:`perpendicular` of γ(0) = ``gamma``, of length 1.
 
     Turned about γ by the constant angle between the two, whose cosine and sine are rational.
     """
     began = perpendicular(gamma)
     if xi == began:
-        return whole
+        return known
     cosine, sine = dot(xi, began), dot(xi, cross(gamma, began))
 
     def turned(working: int, time: Fraction) -> list[arb]:
-        values = whole(time, working)
+        values = known(time, working)
         across = cross(values[3:6], values[6:])
         return [*values[:6], *(ball(cosine) * x + ball(sine) * y for x, y in zip(values[6:], across, strict=True))]
 

@@ -63,7 +63,7 @@ class Resolved:
         """Whether the axes given are not these."""
         return self.axes != IDENTITY
 
-    def given(self, state: Any) -> list[BallLike]:
+    def in_given_axes(self, state: Any) -> list[BallLike]:
         """A state, (Ω, γ) or (Ω, γ, ξ), in the axes given, over any ring that rationals act on."""
         return [value for begin in range(0, len(state), 3) for value in rotated(self.axes, state[begin : begin + 3])]
 

@@ -91,7 +91,7 @@ class ExactRelation:
         """Whether the relation holds, exactly."""
         return self.test(self.values(top, start))
 
-    def found(self, top: HeavyTop, start: State) -> str:
+    def named_values(self, top: HeavyTop, start: State) -> str:
         """The tested quantities, with their values."""
         values, names = [shown(value) for value in self.values(top, start)], self.names.split(", ")
         if len(names) < len(values):
@@ -112,7 +112,7 @@ def require(name: str, conditions: Iterable[ExactRelation], top: HeavyTop, start
     for condition in conditions:
         if not condition.holds(top, start):
             raise NotInClass(
-                f"{name} needs {condition.text}, but {condition.found(top, start)}.",
+                f"{name} needs {condition.text}, but {condition.named_values(top, start)}.",
                 "Rename the axes if need be; `heavytop.reference` finds the class of a motion by itself.",
             )
 

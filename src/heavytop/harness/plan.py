@@ -154,7 +154,7 @@ def load(name: str, kinds: Kinds) -> tuple[Plan, str]:
     except RecursionError:
         raise InputError(f"The plan {name} is nested too deeply.", _KEYS) from None
     except ValueError as error:  # of TOML, of an integer of too many digits, and of msgspec
-        cause = f"The plan {name} is not valid: {invalid(error)}."
+        cause = f"The plan {name} is not valid: {invalid(error, Plan)}."
         raise InputError(cause, _KEYS) from None
     return plan, hashlib.sha256(text.encode()).hexdigest()
 
@@ -435,7 +435,7 @@ def positive(texts: list[str], what: str) -> list[Fraction]:
 def samples(count: int) -> int:
     """The count; raises InputError where it cannot be."""
     if not 1 <= count <= _MAX_SAMPLES:
-        raise InputError(f"samples must be from 1 to {_MAX_SAMPLES}; got {count}.", "Give such as 100.")
+        raise InputError(f"samples must be from 1 to {_MAX_SAMPLES}; got {count}.", "Give, for example, 100.")
     return count
 
 

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 import msgspec
 
+from heavytop import extras
 from heavytop.cases import Case
 from heavytop.errors import (
     Contradiction,
@@ -425,9 +426,11 @@ def ended_its_process(task: Task, times: int, how: str = "") -> Row:
 def begin_worker(*_kinds: MeasuredKind) -> None:
     """In a new process, which leaves interrupts to its parent.
 
-    With the kinds all that measures was imported.  None of it is garbage ever: it is not looked at again.
+    With the kinds all that measures was imported, heyoka without its converters.  None of it is garbage ever: it is not
+    looked at again.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    extras.alone = True
     gc.freeze()
 
 

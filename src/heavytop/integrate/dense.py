@@ -139,10 +139,12 @@ def _fixed_point(values: Sequence[Dyadic], bits: int) -> fmpq_poly:
 class Dense:
     """A run from t = 0 whose steps are looked at one by one.
 
+    steps_of: gives the steps of such a run, on and on, and sets what it says of it.
     until: exact, a number of the format.  outcome, steps, reached, order, seconds, flags: as of a
     :class:`heavytop.integrate.trajectory.Trajectory`, once :meth:`pieces` is at its end.
     """
 
+    steps_of: Callable[[Dense], Iterator[Piece]]
     problem: Problem
     until: Fraction
     tolerance: Fraction | None = None
@@ -158,7 +160,7 @@ class Dense:
         """The steps, the last one cut at ``until``; none at an equilibrium."""
         began = perf_counter()
         try:
-            for piece in self._steps():
+            for piece in self.steps_of(self):
                 ends = piece.began + piece.length
                 self.reached = ends
                 if abs(ends) >= abs(self.until):
@@ -172,66 +174,54 @@ class Dense:
         finally:
             self.seconds["run"] = perf_counter() - began
 
-    def _steps(self) -> Iterator[Piece]:
-        raise NotImplementedError
-
-    def _stopped(self) -> bool:
+    def stopped(self) -> bool:
+        """Whether the steps so far are all that may be taken."""
         if self.step_limit is None or self.steps < self.step_limit:
             return False
         self.outcome = Outcome.STEP_LIMIT
         return True
 
 
-class OfHeyoka(Dense):
-    """Steps of heyoka."""
-
-    __slots__ = ()
-
-    def _steps(self) -> Iterator[Piece]:
-        problem, bits = self.problem, self.problem.precision.bits
-        carried = problem.xi is not None
-        tool = compile_heyoka(problem.system, problem.precision, attitude=carried, tolerance=self.tolerance)
-        self.flags, self.seconds["compile"] = tool.flags, tool.seconds
-        with tool.borrowed() as engine:
-            load(engine, problem)
-            self.order = engine.order
-            stepper = Stepper(engine, self.until > 0, None, None)
-            while not self._stopped():
-                began = sum(map(exact, engine.dtime), Fraction(0))
-                self.outcome = stepper.single()
-                if self.outcome is not Outcome.SUCCESS or stepper.rest is not None:
-                    return
-                self.steps += 1
-                rows = stepper.polynomial()
-                doubles = rows if problem.precision == DOUBLE else None
-                yield Piece(began, exact(engine.last_h), bits, partial(_of_row, rows), doubles=doubles)
-
-
-class OfWords(Dense):
-    """Steps of the multi-word integrator."""
-
-    __slots__ = ()
-
-    def _steps(self) -> Iterator[Piece]:
-        problem, bits = self.problem, self.problem.precision.bits
-        arithmetic, scaled = choose(problem, self.tolerance)
-        self.seconds["compile"] = compile_words(arithmetic, problem.system, problem.xi is not None)
-        self.flags = arithmetic.flags
-        if scaled.rest:
-            return
-        run = arithmetic.begin(scaled, self.until > 0)
-        sign, goal = (1 if run.forwards else -1), abs(self.until) * scaled.rate
-        while not self._stopped():
-            began = run.time
-            status = run.advance(goal, 1)
-            self.steps, self.order = run.steps, run.order
-            if status is not Status.OK:
-                self.outcome = OUTCOMES[status]
+def _of_heyoka(run: Dense) -> Iterator[Piece]:
+    problem, bits = run.problem, run.problem.precision.bits
+    carried = problem.xi is not None
+    tool = compile_heyoka(problem.system, problem.precision, attitude=carried, tolerance=run.tolerance)
+    run.flags, run.seconds["compile"] = tool.flags, tool.seconds
+    with tool.borrowed() as engine:
+        load(engine, problem)
+        run.order = engine.order
+        stepper = Stepper(engine, run.until > 0, None, None)
+        while not run.stopped():
+            began = sum(map(exact, engine.dtime), Fraction(0))
+            run.outcome = stepper.single()
+            if run.outcome is not Outcome.SUCCESS or stepper.rest is not None:
                 return
-            # double-double gives y_n, the others y_n h^n
-            powers, unit = isinstance(run, Floating), sign / scaled.rate
-            read = _reader(run, scaled, scaled.rate if powers else Fraction(1))
-            yield Piece(began * unit, (run.time - began) * unit, bits, read, powers)
+            run.steps += 1
+            rows = stepper.polynomial()
+            doubles = rows if problem.precision == DOUBLE else None
+            yield Piece(began, exact(engine.last_h), bits, partial(_of_row, rows), doubles=doubles)
+
+
+def _of_multiword(run: Dense) -> Iterator[Piece]:
+    problem, bits = run.problem, run.problem.precision.bits
+    arithmetic, scaled = choose(problem, run.tolerance)
+    run.seconds["compile"] = compile_words(arithmetic, problem.system, problem.xi is not None)
+    run.flags = arithmetic.flags
+    if scaled.rest:
+        return
+    steps = arithmetic.begin(scaled, run.until > 0)
+    unit, goal = (1 if steps.forwards else -1) / scaled.rate, abs(run.until) * scaled.rate
+    while not run.stopped():
+        began = steps.time
+        status = steps.advance(goal, 1)
+        run.steps, run.order = steps.steps, steps.order
+        if status is not Status.OK:
+            run.outcome = OUTCOMES[status]
+            return
+        # double-double gives y_n, the others y_n h^n
+        powers = isinstance(steps, Floating)
+        read = _reader(steps, scaled, scaled.rate if powers else Fraction(1))
+        yield Piece(began * unit, (steps.time - began) * unit, bits, read, powers)
 
 
 def _reader(run: ResumableRun, scaled: Scaled, rate: Fraction) -> Callable[[int], Sequence[Dyadic]]:
@@ -241,10 +231,7 @@ def _reader(run: ResumableRun, scaled: Scaled, rate: Fraction) -> Callable[[int]
     return lambda index: [dyadic(row[index] * scaled.sizes[index] * rate**n) for n, row in enumerate(rows)]
 
 
-_DENSE: dict[str, type[Dense]] = {
-    "heyoka": OfHeyoka,
-    "multiword": OfWords,
-}
+_DENSE = {"heyoka": _of_heyoka, "multiword": _of_multiword}
 """By name: those that hand over the polynomial of a step."""
 
 
@@ -252,8 +239,8 @@ def dense(
     integrator: Any, problem: Problem, until: Fraction, tolerance: Fraction | None, step_limit: int | None
 ) -> Dense:
     """A run of that integrator; raises Unsupported for one that hands over no polynomial of its steps."""
-    made = _DENSE.get(integrator) if isinstance(integrator, str) else None
-    if made is None:
+    steps_of = _DENSE.get(integrator) if isinstance(integrator, str) else None
+    if steps_of is None:
         name = said(name_of(integrator))
         raise Unsupported(
             f"The integrator {name} hands over no polynomial of its steps, for events or states between samples.",
@@ -266,7 +253,7 @@ def dense(
             f"A run to t = {decimal_text(end, 6)} takes some {steps:.0e} steps, and each is kept or looked at.",
             f"Up to {MOST_STEPS:.0e} are tried: ask for an earlier time, or give a step limit.",
         )
-    return made(problem, end, tolerance, step_limit)
+    return Dense(steps_of, problem, end, tolerance, step_limit)
 
 
 class DenseOutput:

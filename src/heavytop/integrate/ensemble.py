@@ -17,7 +17,7 @@ from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.lanes import Lanes, Work
 from heavytop.integrate.heyoka.motions import integrate_to_samples
 from heavytop.integrate.trajectory import EnsembleObserver, Finished, Problem, Trajectory
-from heavytop.precision import DOUBLE, OrderedRing, exact, number
+from heavytop.precision import DOUBLE, OrderedRing, exact, number, require
 from heavytop.top.heavy_top import check_times
 
 
@@ -51,29 +51,42 @@ def propagate_ensemble(
     Raises InputError for no problems, for problems of several kinds, for times out of order, for a format that the
     platform lacks, and for fewer than 1 thread or 2 lanes.
     """
-    first = one_kind(problems)
-    exact_times = check_times(times)
-    targets = [number(time, first.precision) for time in exact_times]
-    threads = processors() if threads is None else threads
-    if threads < 1 or lanes < 2:
-        raise InputError(f"{threads} threads and {lanes} lanes make no ensemble.", "Use 1 thread and 2 lanes or more.")
-    moves = targets[-1] != 0 and (step_limit is None or step_limit > 0)
-    batch = first.precision == DOUBLE and moves
+    first, work = work_of(problems, times, step_limit, observer)
+    if lanes < 2:
+        raise InputError(f"{lanes} lanes make no ensemble.", "Use 2 lanes or more.")
+    batch = first.precision == DOUBLE and work.moves
     width = lanes if batch else None
-    tool = compiled(first.system, first.precision, attitude=first.xi is not None, lanes=width, **options)
+    work.tool = compiled(first.system, first.precision, attitude=first.xi is not None, lanes=width, **options)
+    return in_threads(partial(_in_lanes if batch else _one_by_one, work), work, threads, width or 1, observer, finished)
+
+
+def work_of(
+    problems: Sequence[Problem], times: Sequence[Any], step_limit: int | None, observer: EnsembleObserver | None
+) -> tuple[Problem, Work]:
+    """The first problem and the work of an ensemble; raises InputError as :func:`propagate_ensemble`."""
+    first = one_kind(problems)
+    targets = [number(time, require(first.precision)) for time in check_times(times)]
     pending = deque(enumerate(problems))
-    work = Work(tool, targets, [exact(target) for target in targets], step_limit, observer is not None, pending)
-    run = partial(_in_lanes if batch else _one_by_one, work)
-    return in_threads(run, work, min(threads, -(-len(problems) // (lanes if batch else 1))), observer, finished)
+    return first, Work(None, targets, [exact(t) for t in targets], step_limit, observer is not None, pending)
 
 
 def in_threads(
-    run: Callable[[], None], work: Work, threads: int, observer: EnsembleObserver | None, finished: Finished | None
+    run: Callable[[], None],
+    work: Work,
+    threads: int | None,
+    width: int,
+    observer: EnsembleObserver | None,
+    finished: Finished | None,
 ) -> list[Trajectory]:
-    """The motions of ``work`` in the order of its problems, by so many threads that each do ``run``, or by this one.
+    """The motions of ``work`` in the order of its problems, by threads that each do ``run``, or by this one.
 
-    observer, finished: as in :func:`propagate_ensemble`; called by this thread.
+    threads, observer, finished: as in :func:`propagate_ensemble`; the last two are called by this thread.
+    width: problems that a thread runs side by side.
     """
+    threads = processors() if threads is None else threads
+    if threads < 1:
+        raise InputError(f"{threads} threads make no ensemble.", "Use 1 thread or more.")
+    threads = min(threads, -(-len(work.pending) // width))
     done: dict[int, Trajectory] = {}
     error_state = numpy.geterr()
 

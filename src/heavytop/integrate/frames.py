@@ -13,14 +13,12 @@ from numpy.typing import NDArray
 from heavytop.errors import InputError
 from heavytop.exact.resolved import resolve
 from heavytop.integrate.trajectory import Problem, Trajectory
+from heavytop.multiword.pairs import Pairs
 from heavytop.precision import DOUBLE, Precision, Vector, exact, number
 from heavytop.top.attitude import perpendicular, rotated, transposed
 from heavytop.top.bodies import Body, Frame
 from heavytop.top.equations import GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
-
-_SPLIT = 134217729.0
-"""2^27 + 1, by which Dekker splits a double."""
 
 
 def framed(run: Trajectory, frame: Frame) -> Trajectory:
@@ -39,10 +37,10 @@ def in_frame(values: NDArray[numpy.float64], frame: Frame, precision: Precision)
     if not len(values):
         return values
     rotated = numpy.array(values, copy=True)
-    whole = [[entry.denominator == 1 for entry in row] for row in frame.axes]
+    is_integral = [[entry.denominator == 1 for entry in row] for row in frame.axes]
     for begin in range(0, rotated.shape[1], 3):
         part = values[:, begin : begin + 3]
-        if all(map(all, whole)):
+        if all(map(all, is_integral)):
             turned = _permuted(part, frame)
         elif precision == DOUBLE:
             turned = _in_double(part.astype(float), frame)
@@ -70,29 +68,11 @@ def _turned_exactly(line: Sequence[Any], frame: Frame, precision: Precision) -> 
 
 
 def _in_double(part: NDArray[numpy.float64], frame: Frame) -> NDArray[numpy.float64]:
-    """A times each vector, A in two doubles, products without error and sums in two doubles: rounded once."""
-    high = numpy.array([[float(entry) for entry in row] for row in frame.axes])
-    low = numpy.array([[float(entry - Fraction(float(entry))) for entry in row] for row in frame.axes])
-    values = numpy.empty_like(part)
+    """A times each vector in two doubles: rounded once."""
+    axes = Pairs.nearest(frame.axes)
     with numpy.errstate(invalid="ignore", over="ignore"):
-        for i in range(3):
-            total, rest = numpy.zeros(len(part)), numpy.zeros(len(part))
-            for j in range(3):
-                product, error = _product(part[:, j], high[i, j])
-                before, total = total, total + product
-                back = total - before
-                rest += (before - (total - back)) + (product - back) + error + part[:, j] * low[i, j]
-            values[:, i] = total + rest
-    return values
-
-
-def _product(a: NDArray[numpy.float64], b: float) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
-    """a b and the rounding error of it, exactly (Dekker), where nothing under- or overflows."""
-    product = a * b
-    scaled, other = _SPLIT * a, _SPLIT * b
-    a_high, b_high = scaled - (scaled - a), other - (other - b)
-    a_low, b_low = a - a_high, b - b_high
-    return product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
+        rows = (axes[i, 0] * part[:, 0] + axes[i, 1] * part[:, 1] + axes[i, 2] * part[:, 2] for i in range(3))
+        return numpy.stack([row.high for row in rows], axis=1)
 
 
 # A motion as it is handed to an integrator, in principal axes, and what comes back in the axes given.
@@ -128,17 +108,17 @@ class Setup:
         """The motion of a body from ``start``."""
         if isinstance(body, HeavyTop) and start.attitude is None:
             return cls(body, start, None, system, precision, None)
-        found = resolve(body, start, precision.bits + _SPARE_BITS)
-        xi = perpendicular(found.start.gamma) if found.xi is None else found.xi
-        if not found.is_rotated:
-            return cls(found.top, found.start, xi, system, precision, None)
+        resolved = resolve(body, start, precision.bits + _SPARE_BITS)
+        xi = perpendicular(resolved.start.gamma) if resolved.xi is None else resolved.xi
+        if not resolved.is_rotated:
+            return cls(resolved.top, resolved.start, xi, system, precision, None)
         if system is GYROSTAT:
             raise InputError(
                 "The gyrostat has its rotor along a principal axis, but the axes given are not principal.",
                 "Give principal axes, or a rotor in any axes: the heavy_gyrostat.",
             )
-        frame = Frame(found.axes, body.centre, start.gamma, rotated(found.axes, xi))
-        return cls(found.top, found.start, xi, system, precision, frame)
+        frame = Frame(resolved.axes, body.centre, start.gamma, rotated(resolved.axes, xi))
+        return cls(resolved.top, resolved.start, xi, system, precision, frame)
 
     def own(self, vector: Sequence[Fraction] | None) -> Sequence[Fraction] | None:
         """A vector of the axes given, in principal axes."""
@@ -160,7 +140,7 @@ class Setup:
         if self.frame is None:
             return state
         axes = self.frame.axes
-        return [value for place in range(0, len(state), 3) for value in rotated(axes, state[place : place + 3])]
+        return [value for first in range(0, len(state), 3) for value in rotated(axes, state[first : first + 3])]
 
     def watched(self, observer: Callable[[Fraction, Any], object] | None) -> Callable[[Fraction, Any], object] | None:
         """An observer that is given the states in the axes given."""

@@ -19,11 +19,22 @@ from importlib.util import find_spec
 from pathlib import Path
 from pkgutil import resolve_name
 from types import FunctionType
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 import msgspec
 
-from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed, Unsupported, invalid, meant, quoted, why
+from heavytop.errors import (
+    HeavyTopError,
+    InputError,
+    OutOfReach,
+    PeerFailed,
+    Unsupported,
+    argument,
+    invalid,
+    meant,
+    quoted,
+    why,
+)
 from heavytop.extras import extra_of, missing
 from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.peers.contract import CheckedPlugin, Declared, contained, quiet, require_equal, said
@@ -61,21 +72,13 @@ _MOST_SECONDS = 10**7
 _EVERY = (*(form.name for form in FORMATS), "real")
 _SYSTEMS = tuple(system.name for system in SYSTEMS)
 _HERE = "heavytop.integrate"
+_CONTROLS = ("step", "tolerance")
 _AGAIN_SECONDS = 1.0
 """A longer call of an integrator of another package is made once."""
 
 
-class IntegratorSource(Protocol):
-    """An integrator that is defined outside this program and every package."""
-
-    @property
-    def name(self) -> str:
-        """In rows and messages."""
-        ...
-
-    def load(self) -> Callable[..., Any]:
-        """The peer; raises InputError where absent."""
-        ...
+IntegratorSource: TypeAlias = "Command | PythonFile | PythonObject | Integrator"
+"""Where an integrator is defined that is neither this program's nor a package's; a record in no table is its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +140,7 @@ class Integrator:
             raise missing(extra_of(entry.lacks), f"The integrator {self.name}")
         try:
             with quiet():
-                found = load(entry.function)
+                function = load(entry.function)
         except ImportError as error:
             cause = f"is not available: {said(error)}."
             raise InputError(f"The integrator {self.name} {cause}", entry.remedy) from error
@@ -146,10 +149,10 @@ class Integrator:
         except BaseException as error:  # whatever another package's module does when it is imported
             reason = f"{type(error).__name__}: {said(error)}"
             raise InputError(f"The integrator {self.name} is broken: {reason}.", entry.remedy) from error
-        if not callable(found):
+        if not callable(function):
             cause = f"is broken: {entry.function} is not callable."
             raise InputError(f"The integrator {self.name} {cause}", entry.remedy)
-        return found  # type: ignore[no-any-return]
+        return function  # type: ignore[no-any-return]
 
     def _of_package(self) -> Integrator:
         """The entry of another package's; raises InputError where absent."""
@@ -303,10 +306,10 @@ def name_of(which: str | IntegratorSource) -> str:
 def described(which: str | IntegratorSource, set_to: tuple[str, Fraction] | None = None) -> Integrator:
     """The record, without a look at the integrator: of another package's or a file's it says nothing."""
     if isinstance(which, str):
-        found = INTEGRATORS.get(which) or foreign(which)
+        record = INTEGRATORS.get(which) or foreign(which)
     else:
-        found = which if isinstance(which, Integrator) else foreign(which.name, source=which)
-    return found if set_to is None else replace(found, set_to=set_to)
+        record = which if isinstance(which, Integrator) else foreign(which.name, source=which)
+    return record if set_to is None else replace(record, set_to=set_to)
 
 
 def load(source: str | Callable[..., Any]) -> Any:
@@ -423,7 +426,7 @@ def command_of(table: Any, folder: Path, where: str) -> Command:
         command = msgspec.structs.replace(msgspec.convert(table, Command), folder=str(folder.absolute()))
         _require_possible(command)
     except (msgspec.ValidationError, HeavyTopError) as error:
-        cause = error.cause if isinstance(error, HeavyTopError) else f"{invalid(error)}."
+        cause = error.cause if isinstance(error, HeavyTopError) else f"{invalid(error, Command)}."
         raise InputError(f"{where}: [[integrator]] is not valid: {cause}", _SHOWN) from None
     return command
 
@@ -477,6 +480,12 @@ def _of_packages(path: tuple[str, ...]) -> dict[str, Integrator]:
     return {entry.name: foreign(entry.name, entry.value) for entry in entries if entry.name not in FORMER}
 
 
+def compiles(name: str) -> bool:
+    """Whether an integrator of this program compiles its code in each process, which may take ten seconds."""
+    entry = INTEGRATORS.get(name)
+    return entry is not None and not entry.streams and name != "mpmath:odefun"
+
+
 def is_third_party(name: str) -> bool:
     """Whether an integrator of that name is not one of this program's."""
     return name not in INTEGRATORS and name not in FORMER
@@ -524,9 +533,7 @@ def ready(which: str | IntegratorSource, control: tuple[str, Fraction] | None = 
             takes_any = any(argument.kind is argument.VAR_KEYWORD for argument in arguments.values())
         for option in options:
             if option not in arguments and not takes_any and own:
-                raise InputError(
-                    f"The integrator {name} has no {option}.", "Fixed steps take a step, others a tolerance."
-                )
+                raise no_option(name, option)
             if option not in arguments and not takes_any:
                 raise PeerFailed(f"{name} has no {option}")
         if "step_limit" in arguments and not own:
@@ -556,7 +563,7 @@ def control_name(which: str | IntegratorSource) -> str:
         return integrator.source.control
     if integrator.control:
         return integrator.control
-    for name in ("step", "tolerance"):
+    for name in _CONTROLS:
         try:
             ready(integrator, (name, Fraction(1, 100)))
         except (InputError, PeerFailed):
@@ -743,13 +750,24 @@ def _names(function: Callable[..., Any]) -> frozenset[str] | None:
     return frozenset(parameters)
 
 
+def no_option(name: str, option: str) -> InputError:
+    """The error of an option that an integrator does not have: what sets its accuracy, or who has that option."""
+    entry = described(name)
+    if option in _CONTROLS and entry.control:
+        remedy = f"Leave it out: {argument(entry.control)} sets the accuracy of {name}."
+    else:
+        streaming = [other.name for other in INTEGRATORS.values() if other.streams]
+        remedy = f"Leave it out, or use {' or '.join(streaming) if option == 'step_limit' else 'another integrator'}."
+    return InputError(f"The integrator {name} has no {argument(option)}.", remedy)
+
+
 def _with(function: Callable[..., Any], name: str, options: dict[str, Any]) -> Callable[..., Any]:
     """``function`` with these options; raises InputError for one that it does not have."""
     # other callables may have no hash
     names = (_names if isinstance(function, FunctionType) else _names.__wrapped__)(function)
     for option in options:
         if names is not None and option not in names:
-            raise InputError(f"The integrator {name} has no {option}.", f"Leave it out, or use another than {name}.")
+            raise no_option(name, option)
 
     def call(*arguments: Any, **more: Any) -> Any:
         return function(*arguments, **more, **options)

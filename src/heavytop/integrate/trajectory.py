@@ -384,33 +384,14 @@ class InSpace:
         return self._in_double(output(f"euler:{sequence}" if isinstance(sequence, str) else sequence))
 
 
-class LazyStates:
-    """States that a function makes when they are first asked for."""
-
-    __slots__ = ("_make",)
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            """An attribute that is not there: ``states`` still to be made; of two threads both may make them."""
-            if name != "states":
-                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
-            make = self._make
-            if make is not None:
-                object.__setattr__(self, "states", make())
-                object.__setattr__(self, "_make", None)
-            return object.__getattribute__(self, "states")
-
-
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Trajectory(LazyStates, Tabular, InSpace):
+class Trajectory(Tabular, InSpace):
     """A computed motion at the times that were reached.
 
     times: exact values of the rounded times, shape (n,): a tuple, or of many a sequence that makes each when it is
     asked for.
     states: native numbers, an array of shape (n, 6), order Ω1 Ω2 Ω3 γ1 γ2 γ3; or (n, 9) with the attitude vector ξ
-    behind.  It may be given as rows, or as a function that makes it when it is first asked for; it has no row where an
-    observer took the states.
+    behind.  It may be given as rows; it has none where an observer took the states.
     time_reached: exact time of the last finite step end, or the last time asked for.
     seconds: ``compile`` and ``run`` apart.
     flags: everything that can change bits, as text.
@@ -443,14 +424,7 @@ class Trajectory(LazyStates, Tabular, InSpace):
 
     def __post_init__(self) -> None:
         width = 6 if self.problem.xi is None or self.attitude is not None else 9
-        rows = self.states
-        if callable(rows):
-            object.__setattr__(self, "_make", rows)
-            object.__delattr__(self, "states")
-            return
-        states = (
-            (rows if isinstance(rows, numpy.ndarray) else numpy.array(rows)) if len(rows) else numpy.empty((0, width))
-        )
+        states = numpy.asarray(self.states) if len(self.states) else numpy.empty((0, width))
         object.__setattr__(self, "states", states)
 
     @overload

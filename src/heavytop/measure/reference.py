@@ -444,7 +444,7 @@ def reference(
     the start; OutOfReach where the digits cannot be proven, and for numbers of more than 9,000 digits.
     """
     if digits not in DIGITS:
-        raise InputError(f"digits must be from 1 to 20000; got {quoted(digits)}.", "Give such as 50.")
+        raise InputError(f"digits must be from 1 to 20000; got {quoted(digits)}.", "Give, for example, 50.")
     instants = [exact(time) for time in times]
     known = BodyMotion(top, start, system, finder, effort)
     require_handy(known.resolved.top, known.resolved.start, instants)
@@ -469,7 +469,7 @@ def reference(
         states = [known_texts(known.state(time, bits), known.method, time, digits) for time in instants]
         return msgspec.structs.replace(result, states=states)
     latest = max(instants, key=abs, default=Fraction(0))
-    method, whole = known.whole(latest, bits_of(digits) + GUARD_BITS)
+    method, whole = known.known_attitude(latest, bits_of(digits) + GUARD_BITS)
     motion = KnownMotion(whole, instants, digits, top.centre, start.gamma, method)
     parts = [known_texts(motion.at(index), method, time, digits) for index, time in enumerate(instants)]
     result = msgspec.structs.replace(

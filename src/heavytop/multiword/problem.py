@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import ctypes
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
 from math import isqrt
-from threading import local
 
 import numpy
 
 from heavytop.extras import Stub
 from heavytop.multiword.codegen.machine_code import (
-    DOUBLES,
     INT,
     LANES,
     POINTER,
@@ -44,7 +41,7 @@ class Status(Enum):
 
 
 class Steps(ABC):
-    """One motion on its way, in scaled units; its time is |τ|.
+    """A motion on its way, in scaled units; its time is |τ|.
 
     steps: taken so far.  forwards: whether time is positive.
     """
@@ -81,7 +78,7 @@ class Steps(ABC):
 
 
 class ResumableRun(Steps):
-    """One that can be taken up again where it was left."""
+    """A motion that can be taken up again where it was left."""
 
     @abstractmethod
     def place(self) -> tuple[str, ...]:
@@ -206,10 +203,13 @@ def variation(slopes: Doubles) -> Doubles:
     orders, size, _ = slopes.shape
     if isinstance(ir, Stub):
         return _variation_by_numpy(slopes)
-    room = _rooms.of(orders, size)
-    room.given[:] = slopes.ravel()
-    _machine(size).functions["variation"](*room.pointers, orders)
-    return room.table[:, :, :size].copy()
+    width = _width(size)
+    entries, powers = doubles(slopes.size), doubles((orders + 1) * size * width)
+    entries[:] = slopes.ravel()
+    table = powers.reshape(orders + 1, size, width)
+    table[0, :, :size] = numpy.eye(size)
+    _machine(size).functions["variation"](pointer(entries), pointer(powers), orders)
+    return table[:, :, :size]
 
 
 def _variation_by_numpy(slopes: Doubles) -> Doubles:
@@ -219,30 +219,6 @@ def _variation_by_numpy(slopes: Doubles) -> Doubles:
     for n in range(orders):
         powers[n + 1] = numpy.einsum("mij,mjk->ik", slopes[: n + 1], powers[n::-1]) / (n + 1)
     return powers
-
-
-class _Room:
-    """The arrays that one thread computes with; V_0 stays."""
-
-    def __init__(self, orders: int, size: int) -> None:
-        width = _width(size)
-        self.given, products = doubles(orders * size * size), doubles((orders + 1) * size * width)
-        self.table = products.reshape(orders + 1, size, width)
-        self.table[0, :, :size] = numpy.eye(size)
-        self.pointers = pointer(self.given), pointer(products)
-
-
-class _Rooms(local):
-    def __init__(self) -> None:
-        self.made: dict[tuple[int, int], _Room] = {}
-
-    def of(self, orders: int, size: int) -> _Room:
-        if (orders, size) not in self.made:
-            self.made[orders, size] = _Room(orders, size)
-        return self.made[orders, size]
-
-
-_rooms = _Rooms()
 
 
 def _width(size: int) -> int:
@@ -269,7 +245,7 @@ def _machine(size: int) -> Machine:
 
     code.loop(0, orders, order, [])
     code.builder.ret_void()
-    return compiled(module, {"variation": (None, [DOUBLES, DOUBLES, ctypes.c_int64])})
+    return compiled(module)
 
 
 def _product(

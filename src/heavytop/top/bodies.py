@@ -10,7 +10,7 @@ from math import isqrt, lcm
 from pathlib import Path
 from typing import Any
 
-from heavytop.errors import InputError, prefixed, quoted
+from heavytop.errors import InputError, argument, prefixed, quoted
 from heavytop.precision import (
     Given,
     Vector,
@@ -227,7 +227,7 @@ _ROUNDED_BITS = 256
 _ROUNDED_DATA = Fraction(1, 2**40)
 """A plate or a rod in rounded numbers is one."""
 _PRINTED_DATA = Fraction(1, 10**6)
-"""Of the tensor: a plate or a rod in seven digits is not warned of."""
+"""Part of the tensor: a plate or a rod in seven digits is not warned of."""
 _SHAPES = "Give 3 numbers (a diagonal tensor), 6 (I11, I22, I33, I12, I13, I23) or 9 (row by row)."
 
 
@@ -471,13 +471,14 @@ def body_of(data: Mapping[str, Any]) -> Body:
     """The body of a ``file``, and ``link``, with the gravity that stands beside it; raises InputError for more keys."""
     twice = [key for key in BODY if key in data and key != "gravity"]
     if twice:
-        raise InputError(f"file and {twice[0]} were given.", f"The file says {twice[0]}: leave it out.")
+        given = argument(twice[0])
+        raise InputError(f"{argument('file')} and {given} were given.", f"The file says {twice[0]}: leave {given} out.")
     return Body.from_file(data["file"], data.get("link"), gravity=data.get("gravity"))
 
 
 def _require(data: Mapping[str, Any], key: str) -> Any:
     if key not in data:
-        raise InputError(f"{key} is missing.", f"Give {key}, or the name of a case that has it.")
+        raise InputError(f"{argument(key)} is missing.", "Give it, or the name of a case that has it.")
     return data[key]
 
 
@@ -487,12 +488,12 @@ def _body(data: Mapping[str, Any]) -> HeavyTop | Body:
     if "weight" in data:
         if described:
             raise InputError(
-                f"weight and {described[0]} were given.",
+                f"{argument('weight')} and {argument(described[0])} were given.",
                 "Give weight with principal moments about the pivot, or mass and gravity with a tensor in any axes.",
             )
         if len(data["inertia"]) in (6, 9):
             raise InputError(
-                f"inertia has {len(data['inertia'])} numbers, and a weight stands beside it.",
+                f"{argument('inertia')} has {len(data['inertia'])} numbers, and a weight stands beside it.",
                 "A tensor in any axes needs mass and gravity in place of weight; with weight give 3 principal moments.",
             )
         return HeavyTop(data["inertia"], data["weight"], data["centre"], rotor)
@@ -506,9 +507,9 @@ def _body(data: Mapping[str, Any]) -> HeavyTop | Body:
 def _start(data: Mapping[str, Any], normalize: bool) -> State:
     named = [key for key in _ATTITUDES[1:] if key in data]
     if len(named) > 1:
-        raise InputError(f"{named[0]} and {named[1]} were given.", "Give the attitude once.")
+        raise InputError(f"{argument(named[0])} and {argument(named[1])} were given.", "Give the attitude once.")
     if not named and "gamma" not in data:
-        raise InputError("No attitude was given.", f"Give one of {', '.join(_ATTITUDES)}.")
+        raise InputError("No attitude was given.", f"Give one of {', '.join(map(argument, _ATTITUDES))}.")
     spin = {key: data.get(key) for key in ("omega", "omega_space")}
     if not named:
         start = State(gamma=data["gamma"], **spin)

@@ -54,8 +54,8 @@ class Parameters(NamedTuple):
     def mapped(self, number: Callable[[Any], Any]) -> Parameters:
         """The parameters in another ring: ``number`` of each of them."""
         rotors = tuple(map(number, self.rotors))
-        kept = rotors if isinstance(self.rotor, tuple) else rotors[0]
-        return Parameters(tuple(map(number, self.inertia)), tuple(map(number, self.moment)), kept)
+        rotor = rotors if isinstance(self.rotor, tuple) else rotors[0]
+        return Parameters(tuple(map(number, self.inertia)), tuple(map(number, self.moment)), rotor)
 
 
 def heavy_top(p: Parameters, y: Sequence[Scalar]) -> tuple[Scalar, ...]:
@@ -259,12 +259,12 @@ def system_of(chosen: System | str | None, *tops: WithRotor) -> System:
     return resolved
 
 
-def require_no_other_rotor(asked: System, top: WithRotor) -> None:
+def require_no_other_rotor(chosen: System, top: WithRotor) -> None:
     """Raises InputError where the top has a rotor and the system another one, or none."""
-    if top.rotor is not None and asked is not HEAVY_GYROSTAT:
-        why = "takes its rotor from the start" if asked is GYROSTAT else "has no rotor"
+    if top.rotor is not None and chosen is not HEAVY_GYROSTAT:
+        why = "takes its rotor from the start" if chosen is GYROSTAT else "has no rotor"
         raise InputError(
-            f"The top has a rotor ({', '.join(map(shown, top.rotor))}), but the system {asked.name} {why}.",
+            f"The top has a rotor ({', '.join(map(shown, top.rotor))}), but the system {chosen.name} {why}.",
             "Use the system heavy_gyrostat, or give no rotor.",
         )
 

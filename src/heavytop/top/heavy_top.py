@@ -10,7 +10,7 @@ from math import isqrt
 from operator import lt
 from typing import Any, cast
 
-from heavytop.errors import InputError, prefixed, quoted
+from heavytop.errors import InputError, argument, prefixed, quoted
 from heavytop.precision import (
     MOST_MEMBERS,
     Given,
@@ -79,7 +79,7 @@ class HeavyTop:
         try:
             load = exact(weight)
         except InputError as error:
-            raise InputError(f"weight: {error.cause}", error.remedy) from None
+            raise InputError(f"{argument('weight')}: {error.cause}", error.remedy) from None
         object.__setattr__(self, "inertia", moments)
         object.__setattr__(self, "weight", load)
         object.__setattr__(self, "centre", vector(centre, "centre"))

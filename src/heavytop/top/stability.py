@@ -3,7 +3,9 @@
 Linearised about a steady motion, the field has eigenvalues ±λ beside those, 0, of its conserved quantities: λ² are the
 roots of a polynomial of degree one (of Ω alone, where γ does not enter its rates) or two, of rational coefficients.
 One of them that is positive or not real proves the motion unstable, at the rate max Re λ.  That none is proves nothing
-by itself.  Stable is said where the second variation of E − ω M·γ − κ γ²/2 − c G is definite on the level of the two
+by itself.  A free body of two equal moments that turns about an axis between them is unstable without one: its Jordan
+block is a constant part ε of Ω along the axis of symmetry, by which Ω turns at a rate in proportion to ε.
+Stable is said where the second variation of E − ω M·γ − κ γ²/2 − c G is definite on the level of the two
 Casimir functions (Arnold's energy-Casimir method; G is |M|²/2 of a free body, M_k of a top symmetric about axis k), and
 of a regular precession of Lagrange's top, whose inclination is a minimum of the effective potential.
 """
@@ -27,18 +29,30 @@ _AXES = {0: "smallest", 1: "middle", 2: "largest"}
 @dataclass(frozen=True, slots=True)
 class Stability:
     """motion: which it is, in words.  verdict: ``"stable"`` and ``"unstable"`` are proven; ``"spectrally stable"``: no
-    eigenvalue proves it unstable, and nothing proves it stable.  rate: max Re λ, 1/time unit; 0 unless unstable.
+    eigenvalue proves it unstable, and nothing proves it stable.  rate: max Re λ, 1/time unit; 0 unless unstable by an
+    eigenvalue.  drift: where Ω turns away linearly in time, the angle over the time and the part ε of Ω; else 0.
     """
 
     motion: str
     verdict: Literal["stable", "unstable", "spectrally stable"]
     rate: float = 0.0
+    drift: float = 0.0
+
+    @property
+    def why(self) -> str:
+        """The reason, behind the verdict; empty where an eigenvalue or an energy proves it."""
+        if self.drift:
+            return f": a part ε of Ω along the axis of symmetry turns it away linearly, by {self.drift:.4g} ε t"
+        return (
+            ": no eigenvalue proves it unstable, and nothing proves it stable"
+            if self.verdict.startswith("spec")
+            else ""
+        )
 
     def text(self, bits: int = 53) -> str:
         """A sentence; bits: of a rounding whose growth is told."""
-        if self.verdict != "unstable":
-            why = "" if self.verdict == "stable" else ": no eigenvalue proves it unstable, and nothing proves it stable"
-            return f"{self.motion}, {self.verdict}{why}"
+        if not self.rate:
+            return f"{self.motion}, {self.verdict}{self.why}"
         until = bits * math.log(2) / self.rate
         return f"{self.motion}, unstable, {self.rate:.4g} per unit of time: 2^-{bits} grows to 1 by t = {until:.2g}"
 
@@ -53,12 +67,29 @@ def stability(system: System, parameters: Parameters, start: Sequence[Fraction])
     size = 3 if free else 6
     rate = _largest_real_part(*quadratic_of_squares(system, p, y, size))
     motion = _words(system, p, y, free)
-    if rate:
-        return Stability(motion, "unstable", rate)
+    drift = _drift(system, p, y) if free and not rate else 0.0
+    if rate or drift:
+        return Stability(motion, "unstable", rate, drift)
     # of a free rotation γ, which enters no rate of Ω, is taken along Ω
     state = [*y[:3], *y[:3]] if free else y
     proven = system is HEAVY_TOP and any(state[3:]) and is_stable(p, state, _sign)
     return Stability(motion, "stable" if proven else "spectrally stable")
+
+
+def _drift(system: System, p: Parameters, y: Sequence[Fraction]) -> float:
+    """|∂Ω'/∂Ω_k|/|Ω| at a steady free rotation where Ω_k is constant and Ω' linear in the others; 0 where none is.
+
+    There two moments are equal, and (Ω_i, Ω_j) turns at the constant rate that Ω_k gives it.
+    """
+    along_2 = (Fraction(0), p.rotor, Fraction(0)) if system is GYROSTAT else (p.rotor,) * 3
+    rotor = p.rotor if isinstance(p.rotor, tuple) else along_2
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        if p.inertia[i] == p.inertia[j] and not rotor[i] and not rotor[j]:
+            beside = system.field(p, [value + (n == k) for n, value in enumerate(y)])
+            if square := beside[i] ** 2 + beside[j] ** 2:
+                return _root(square / (y[i] ** 2 + y[j] ** 2))
+    return 0.0
 
 
 def quadratic_of_squares(system: System, p: Parameters, y: Sequence[Any], size: int = 6) -> tuple[Any, Any]:

@@ -190,6 +190,12 @@ def test_free_rotations_are_said_to_be_stable_or_not(tmp_path: Path) -> None:
     assert rotations[0]["rate"] == pytest.approx(8**-0.5)  # type: ignore[index]
     shown = heavytop("body", tmp_path / "a.urdf").stdout
     assert "about axis 1: unstable, rate 0.3536 of the angular velocity" in shown
+    _, document = judged(tmp_path / "b.urdf", urdf(["0.1", "0.1", "0.05", "0", "0", "0"], mass="9", centre="0 0 0"))
+    assert [rotation["verdict"] for rotation in document["rotations"]] == ["unstable", "unstable", "stable"]  # type: ignore[attr-defined]
+    shown = " ".join(heavytop("body", tmp_path / "b.urdf").stdout.split())
+    assert (
+        "about axis 1: unstable: a part ε of Ω along the axis of symmetry turns it away linearly, by 0.5 ε t" in shown
+    )
 
 
 def test_usd_and_the_ball_joint_of_mjcf(tmp_path: Path) -> None:

@@ -165,6 +165,9 @@ def _steeper_psi(i1, i3, alpha, u, t, lib):
     return ershkov.psi(i1, i3, alpha, u, t, lib) + sympy.Rational(1, 10**12) * t
 
 
+OF_MOTION = {"1.1", "1.2", "1.3", "3.1"}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("claim", "equation"),
@@ -176,16 +179,17 @@ def _steeper_psi(i1, i3, alpha, u, t, lib):
     ],
 )
 def test_a_planted_mistake_is_refuted_in_its_own_equation_and_in_no_other_step(claim, equation):
-    # what does not hold without the mistake says nothing of it; the general case takes long: its smooth branch
+    # what does not hold without the mistake says nothing of it, nor what any mistake may break, as the equations of
+    # motion; the general case takes long: its smooth branch
     rows_without = zip(claim.statements(HEAVY_TOP), report(claim.name).rows, strict=True)
-    held = [(statement, row) for statement, row in rows_without if row.holds]
+    held = [(statement, row) for statement, row in rows_without if row.holds and row.equation not in OF_MOTION]
     if isinstance(claim, GeneralClaim):
         held = [(statement, row) for statement, row in held if row.branch == "smooth"]
     found = judge([statement for statement, _ in held], claim.setting)
     broken = {before.equation for row, (_, before) in zip(found, held, strict=True) if not row.holds}
     assert all(row.equation == before.equation for row, (_, before) in zip(found, held, strict=True))
     assert equation in broken
-    assert broken <= {equation, "1.1", "1.2", "1.3", "3.1"} | ({"4.5", "4.6"} if equation == "4.4" else set())
+    assert broken <= {equation} | ({"4.5", "4.6"} if equation == "4.4" else set())
     if equation in ("2.4", "4.4"):
         of_equation = [row for row in report(claim.name).rows if row.equation == equation]
         assert all(row.holds for row in of_equation), "or the next line would not see them all"

@@ -206,6 +206,30 @@ def test_assumptions_that_contradict_each_other_prove_nothing(assume, relations)
             judged(integral("Omega1", assume=assume, relations=relations, parameters=parameters))
 
 
+@pytest.mark.parametrize(
+    ("inertia", "parameters", "cause", "is_curable"),
+    [
+        (
+            ["4*C", "-C", "C"],
+            {"C": "1"},
+            "I2 = -C of top.inertia must be positive; it is -1 at the sample C = 1.",
+            False,
+        ),
+        (["-2", "1", "1"], {}, "I1 = -2 of top.inertia must be positive.", False),
+        (["C - D", "D - C", "C"], {"C": "2", "D": "1"}, "I2 = -C + D of top.inertia must be positive; it is -1", False),
+        (["C", "C - 5", "C"], {"C": "2"}, "I2 = C - 5 of top.inertia must be positive; it is -3 at the sample", True),
+        (["C", "sqrt(C) - 5", "C"], {"C": "2"}, "it is -3.58579 at the sample C = 2.", True),
+        (["1", "1", "1", "D", "0", "0"], {"D": "2"}, "principal minor 1 - D^2 of top.inertia must be positive", True),
+        (["1", "-D^2", "1"], {"D": "2"}, "I2 = -D^2 of top.inertia must be positive; it is -4", False),
+    ],
+)
+def test_a_moment_that_is_not_positive_is_told_with_its_value_and_what_cures_it(inertia, parameters, cause, is_curable):
+    with pytest.raises(InputError) as error:
+        judged(integral("Omega1", top={"inertia": inertia}, parameters=parameters))
+    assert cause in str(error.value)
+    assert ("Change the sample" in error.value.remedy) is is_curable
+
+
 @pytest.mark.parametrize("relations", [["a^2 + 1"], ["a - 1", "a - 2"], ["a - b", "a - b - 1"]])
 def test_relations_that_no_parameters_meet_prove_nothing(relations):
     with pytest.raises(InputError, match="breaks the relation"):
@@ -279,7 +303,7 @@ def test_what_is_0_all_over_the_unit_sphere_is_0_on_no_thin_set():
     off = sum(x**2 for x in STATE[3:]) - 1
     flow = Flow(lambda e: sympy.Integer(0), frozenset(STATE), always=(off,))
     statement = Statement("", 1, "", ALL, off, "", Formulas(), flow)
-    setting = Setting(TIME, (), ())
+    setting = Setting(TIME)
     field = Field(setting.assumptions(0), [off, STATE[0]])
     region = Region(field, setting, statement, [])
     assert not region.is_zero_nowhere_dense(field.enter(off).numerator)

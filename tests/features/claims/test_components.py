@@ -50,6 +50,13 @@ def rows(report: Audit) -> dict[tuple[str, int], bool | None]:
 
 
 @pytest.mark.slow
+def test_an_angle_without_a_rate_of_its_own_is_judged_by_the_true_one() -> None:
+    """Every divisor of the true rate is a condition: here 1 − u² and the moments."""
+    assert audit(quadrature={"psi": None}).verdict == "holds"
+    assert audit(quadrature={"psi": None}, component={"psi": "t"}).verdict == "refuted"
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "value", ["u1 + (u2 - u1)*sn(p*t, m)^2", "u2 - (u2 - u1)*cn(p*t, m)^2", "(u1+u2+u3)/3 + 16/5*wp3(t, g2, g3)"]
 )

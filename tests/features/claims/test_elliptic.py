@@ -10,9 +10,9 @@ import pytest
 import sympy
 
 from heavytop.errors import InputError
+from heavytop.features.claims.algebra.elliptic import cn, dn, sn
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Assumptions, Field
-from heavytop.features.claims.algebra.structure import cn, dn, sn
 from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 
 T = sympy.Symbol("t", real=True)

@@ -110,6 +110,9 @@ def test_derivatives_are_those_of_the_values(text: str, rate: str) -> None:
         ("1 + 0*wzeta3(t, 4, a)", "1/2", [], "> 0"),
         ("1 + 0*wzeta(t, 4, a)", "1/2", [], "not a period"),
         ("1 + 0*thetaArgument(t, a, 1/2)", "1/2", [], "a ≠ 0"),
+        # a nome lies between 0 and 1, and says nothing of the other arguments
+        ("1 + 0*thetaArgument(t, a, nome(1/3))", "1/2", [], "a ≠ 0"),
+        ("1 + 0*ellipticPi(a, t, nome(1/3))", "-1/2", [], "a < 1"),
         ("1 + 0*wsigma(t, 4, a)", "1/2", [], ""),
     ],
 )

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from fractions import Fraction
-from itertools import islice
 from xml.etree import ElementTree
 
 import numpy
 import pytest
 
-from heavytop.features.claims.claim_error import PAPER_FIGURES, drawings, exact_curves, true_curves
-from heavytop.features.claims.figures import draw_figures
+from heavytop.features.claims.figures import FIGURES, PAPER_FIGURES, draw_figures, exact_curves, true_curves
 from heavytop.features.claims.library.ershkov import PartialCase
+from support.in_process import heavytop
 
 
 def case(ratio: int) -> PartialCase:
@@ -55,20 +53,19 @@ def test_angles_of_the_truth_satisfy_3_2():
         assert numpy.abs(numpy.diff(curves.angles, axis=0)).max() < 1.5
 
 
-def one_of_each():
-    """A figure of the paper, a comparison and the sphere; the others differ in their numbers."""
-    whole = drawings()
-    return replace(whole, papers=islice(whole.papers, 1), comparisons=islice(whole.comparisons, 1))
-
-
 @pytest.mark.slow
-def test_the_files_are_complete_and_the_same_every_time(tmp_path):
-    first, second = (draw_figures(one_of_each(), tmp_path / name) for name in ("one", "two"))
-    names = [file.name for file in first]
+def test_the_files_of_the_command_are_complete_and_the_same_every_time(tmp_path, monkeypatch):
+    one_of_each = {name: FIGURES[name] for name in ("fig2", "truth-ratio2", "momentum-sphere")}
+    monkeypatch.setattr("heavytop.features.claims.figures.FIGURES", one_of_each)
+    assert heavytop("figures", "--out", "one", cwd=tmp_path).returncode == 0
+    second = draw_figures(tmp_path / "two")
+    names = [file.name for file in second]
     assert names[:2] == ["fig2.svg", "fig2.png"]
     assert {"truth-ratio2.svg", "momentum-sphere.svg"} <= set(names)
-    for one, two in zip(first, second, strict=True):
-        assert (one.name, one.read_bytes()) == (two.name, two.read_bytes())
+    assert {file.name for file in (tmp_path / "one").iterdir()} == set(names)
+    for two in second:
+        one = tmp_path / "one" / two.name
+        assert one.read_bytes() == two.read_bytes()
         if one.name == "truth-ratio2.svg":
             for said in (
                 "as printed: Ω off by 1 % of α at t = 0.0100",

@@ -69,7 +69,7 @@ def test_each_kind_of_need_is_kept_apart():
     needs = [Need(ConditionKind.NONNEGATIVE, A), Need(ConditionKind.POSITIVE, B), Need(ConditionKind.NONZERO, C)]
     found = assume([], needs, [], SYMBOLS)
     assert (found.weak, found.facts) == ((A,), (B, C**2))
-    known = Setting(T, (), (), facts=found.facts, weak=found.weak).assumptions(0, facts=(B + 1,), weak=(A + 1,))
+    known = Setting(T, facts=found.facts, weak=found.weak).assumptions(0, facts=(B + 1,), weak=(A + 1,))
     assert (known.weak, known.facts) == ((A, A + 1), (B, C**2, B + 1))
 
 
@@ -79,7 +79,7 @@ def test_each_kind_of_need_is_kept_apart():
 def test_what_the_flow_keeps_is_as_strict_as_the_need(kind, expected):
     kept = OMEGA1 - OMEGA2
     said = statement(sympy.sqrt(kept), RESTING, frozenset({Need(kind, kept)}))
-    field = Prover([said], Setting(T, (), ())).field(said, 0)
+    field = Prover([said], Setting(T)).field(said, 0)
     assert field.tower.sign(field.enter(kept)) == expected
 
 
@@ -91,14 +91,14 @@ def test_a_sign_is_not_kept_where_its_rate_divides_by_what_is_0_on_an_open_set(d
     factor = (divisor * OMEGA1 + divisor * OMEGA2) / divisor
     flow = Flow(lambda e: e * factor, frozenset(STATE), always=(SPHERE,))
     field = Field(Assumptions(T), [OMEGA2])
-    region = Region(field, Setting(T, (), ()), statement(OMEGA2, flow), [])
+    region = Region(field, Setting(T), statement(OMEGA2, flow), [])
     assert region.is_kept(field.enter(OMEGA2).numerator) is expected
 
 
 @pytest.mark.parametrize(("relations", "against"), [((), 0), ((OMEGA1,), 1), ((OMEGA2,), 1), ((OMEGA1 - 1,), 0)])
 def test_an_identity_on_relations_divides_by_nothing_that_is_0_there(relations, against):
     said = statement((OMEGA1 * OMEGA2 + OMEGA1) / OMEGA1 - OMEGA2 - 1, RESTING)
-    proven, conditions = Prover([said], Setting(T, (), (), relations=relations)).prove(said)
+    proven, conditions = Prover([said], Setting(T, relations=relations)).prove(said)
     assert proven
     assert sum("it divides by" in condition.reason for condition in conditions) == against
 
@@ -110,7 +110,7 @@ AT = {T: Fraction(1), A: Fraction(2), P: Fraction(3)}
 
 
 def region_of(e: sympy.Expr, **known: object) -> Region:
-    return Region(Field(Assumptions(T, (P,), **known), [e]), Setting(T, (P,), ()), statement(e), [AT])
+    return Region(Field(Assumptions(T, (P,), **known), [e]), Setting(T, (P,)), statement(e), [AT])
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ from heavytop.features.claims.algebra.conditions import (
 )
 from heavytop.features.claims.algebra.fields import Assumptions, Field, Regularity
 from heavytop.features.claims.algebra.prover import Prover, Region
+from heavytop.features.claims.algebra.reader import FUNCTIONS
 from heavytop.features.claims.algebra.ring import used
 from heavytop.features.claims.algebra.signs import Sign
 from heavytop.features.claims.algebra.statement import AFTER, ALL, BEFORE, Domain, Flow, Formulas, Setting, Statement
@@ -89,7 +90,13 @@ def test_a_sign_meets_what_follows_from_it(sign: Sign, nonzero: bool, positive: 
     ],
 )
 def test_a_function_needs_what_it_needs(function: str, needs: set[str]) -> None:
-    assert words(condition(function, (T, A))) == needs
+    assert words(condition(function, (T, A) if function == "atan2" else (T,))) == needs
+
+
+def test_every_function_of_a_formula_has_conditions_on_its_own_arguments() -> None:
+    symbols = sympy.symbols("u v m", real=True)
+    for name, (_, count) in FUNCTIONS.items():
+        assert all(need.expression.free_symbols <= {*symbols[:count]} for need in condition(name, symbols[:count]))
 
 
 def test_a_number_that_meets_a_need_is_none_and_one_that_does_not_stays() -> None:
@@ -252,7 +259,7 @@ HALVES = sympy.tanh(T) * sympy.sqrt(T**2) - T * sympy.sqrt(sympy.tanh(T) ** 2)
 
 
 def verdict(residual: sympy.Expr, domain: Domain = ALL, flow: Flow | None = None) -> bool | None:
-    setting = Setting(T, (P,), ({P: Fraction(2), A: Fraction(1, 3)},))
+    setting = Setting(T, (P,), samples=({P: Fraction(2), A: Fraction(1, 3)},))
     (row,) = judge([Statement("1", 1, "smooth", domain, residual, "", flow=flow)], setting)
     return row.holds
 
@@ -274,7 +281,7 @@ def test_a_note_makes_another_domain() -> None:
     """Two domains of one label: what is known on the first says nothing on the second."""
     known = Domain("all", 0, ALL.points, "a > 0", facts=(A,))
     residual = sympy.sqrt(A**2) - A
-    setting = Setting(T, (P,), ({P: Fraction(2), A: Fraction(1, 3)},))
+    setting = Setting(T, (P,), samples=({P: Fraction(2), A: Fraction(1, 3)},))
     rows = judge([Statement("1", i, "smooth", d, residual, "") for i, d in enumerate((known, ALL))], setting)
     assert [row.holds for row in rows] == [True, None]
     assert [row.holds for row in reversed(judge([*_both(known, residual)], setting))] == [True, None]
@@ -304,7 +311,7 @@ def test_where_a_derivative_may_have_a_kink_nothing_is_refuted() -> None:
 
 
 def test_a_kink_is_no_place_where_a_residual_is_defined() -> None:
-    setting = Setting(T, (P,), ({P: Fraction(2)},))
+    setting = Setting(T, (P,), samples=({P: Fraction(2)},))
     kink = Statement("1", 1, "smooth", ALL, sympy.sign(sympy.sqrt(T + 1) - sympy.sqrt(2)) + T, "")
     prover = Prover([kink], setting)
     # at 1 the difference of roots is 0, and only to a ball: nobody knows
@@ -316,9 +323,9 @@ def test_a_kink_is_no_place_where_a_residual_is_defined() -> None:
 def test_what_fails_on_the_relations_is_not_removable() -> None:
     statement = Statement("1", 1, "smooth", ALL, T, "")
     for relations, expected in (((), True), ((A - 1,), False)):
-        setting = Setting(T, (P,), ({P: Fraction(2), A: Fraction(1)},), relations=relations)
+        setting = Setting(T, (P,), samples=({P: Fraction(2), A: Fraction(1)},), relations=relations)
         field = Field(setting.assumptions(0), [A - 1])
-        region = Region(field, setting, statement, list(setting.places(statement)))
+        region = Region(field, setting, statement, list(setting.sample_points(statement)))
         assert region.is_removable(Need(ConditionKind.NONZERO, A - 1)) is expected
 
 
@@ -331,7 +338,7 @@ def test_what_is_off_by_less_than_a_short_ball_shows_is_refuted_all_the_same() -
     [Need(ConditionKind.NONNEGATIVE, -1 - T**2), Need(ConditionKind.NONZERO, T - T), Need(ConditionKind.POSITIVE, -P)],
 )
 def test_a_place_where_a_formula_is_undefined_is_no_witness(need: Need) -> None:
-    setting = Setting(T, (P,), ({P: Fraction(2)},))
+    setting = Setting(T, (P,), samples=({P: Fraction(2)},))
     for needs, holds in ((frozenset({need}), None), (frozenset(), False)):
         formulas = Formulas(values=(T,), needs=needs)
         (row,) = judge([Statement("1", 1, "smooth", ALL, 1 + T**2, "", formulas)], setting)
@@ -344,10 +351,10 @@ def test_a_place_where_a_formula_is_undefined_is_no_witness(need: Need) -> None:
 
 def region(expression: sympy.Expr, flow: Flow | None = None, **known) -> tuple[Region, object]:
     """The region of a claim with its sample at a = -2, and the numerator of the expression there."""
-    setting = Setting(T, (P,), ({P: Fraction(2), A: Fraction(-2)},), **known)
+    setting = Setting(T, (P,), samples=({P: Fraction(2), A: Fraction(-2)},), **known)
     statement = Statement("1", 1, "smooth", ALL, T, "", flow=flow)
     field = Field(setting.assumptions(0), [expression])
-    return Region(field, setting, statement, list(setting.places(statement))), field.enter(expression).numerator
+    return Region(field, setting, statement, list(setting.sample_points(statement))), field.enter(expression).numerator
 
 
 @pytest.mark.parametrize("known", [{"facts": (A**2 - 1,)}, {"nonzero": (A,)}, {"facts": (A**2 - 1, -A)}])
@@ -361,10 +368,10 @@ def test_a_condition_of_degree_2_may_part_a_domain() -> None:
     """Where a b > 1, atan a + atan b is atan((a + b)/(1 - a b)), and pi more where a > 0, pi less where a < 0."""
     b = sympy.Symbol("b", real=True)
     expression = sympy.atan(A) + sympy.atan(b) - sympy.atan((A + b) / (1 - A * b)) - sympy.pi
-    setting = Setting(T, (), ({A: Fraction(-2), b: Fraction(-2)},), facts=(A * b - 1,))
+    setting = Setting(T, (), samples=({A: Fraction(-2), b: Fraction(-2)},), facts=(A * b - 1,))
     field = Field(setting.assumptions(0), [expression])
     statement = Statement("1", 1, "smooth", ALL, T, "")
-    where = Region(field, setting, statement, list(setting.places(statement)))
+    where = Region(field, setting, statement, list(setting.sample_points(statement)))
     p = field.enter(expression).numerator
     assert not where.regularity.obstacle_of_generators(used(p), analytic=True)
     assert not where.is_zero_nowhere_dense(p)
@@ -379,7 +386,7 @@ def test_an_identity_that_the_algebra_does_not_know_may_be_0_all_over() -> None:
 
 @pytest.mark.slow
 def test_what_is_said_of_an_undecided_residual_holds_all_balls(monkeypatch) -> None:
-    setting = Setting(T, (P,), ({P: Fraction(2), A: Fraction(-2)},))
+    setting = Setting(T, (P,), samples=({P: Fraction(2), A: Fraction(-2)},))
     gudermannian = sympy.asin(sympy.tanh(A)) - 2 * sympy.atan(sympy.tanh(A / 2))
     statement = Statement("1", 1, "smooth", ALL, sympy.exp(gudermannian) - 1, "")
     for ball in (arb(0.5, 0.75), arb(-0.5, 0.75), arb(0, 1.25)):
@@ -402,7 +409,7 @@ def test_a_half_alone_proves_nothing_of_the_whole() -> None:
 
 def test_both_halves_are_asked_what_they_divide_by() -> None:
     """For one sign of t the divisor is |t|; for the other it is |t| (|a| - a), 0 for all a > 0."""
-    size, setting = sympy.sqrt(T**2), Setting(T, (P,), ({P: Fraction(2), A: Fraction(-2)},))
+    size, setting = sympy.sqrt(T**2), Setting(T, (P,), samples=({P: Fraction(2), A: Fraction(-2)},))
     for sign in (1, -1):
         divisor = (size - sign * T) / 2 + (size + sign * T) / 2 * (sympy.sqrt(A**2) - A)
         residual = sympy.Mul(HALVES, 1 / divisor, evaluate=False)
@@ -415,7 +422,7 @@ def test_both_halves_are_asked_what_they_divide_by() -> None:
 def test_a_power_of_a_rate_in_the_ideal_keeps_no_relation(is_relation: bool, holds: bool | None) -> None:
     """a² = 0 forces a = 0 at each point, which does not make a double zero one that stays."""
     flow = Flow(lambda e: sympy.Integer(0), frozenset({A}), is_relation=is_relation)
-    setting = Setting(T, (P,), ({P: Fraction(2), A: Fraction(0)},), relations=(A**2,))
+    setting = Setting(T, (P,), samples=({P: Fraction(2), A: Fraction(0)},), relations=(A**2,))
     (row,) = judge([Statement("1", 1, "smooth", ALL, A, "", Formulas(values=(A,)), flow)], setting)
     assert row.holds is holds
 
@@ -457,9 +464,9 @@ def test_simpler_conditions_hold_at_the_same_points(expression: sympy.Expr, zero
 def test_a_place_is_one_only_where_the_relations_are_proven_to_be_0() -> None:
     for extra, expected in ((0, 1), (Fraction(1, 10**200), 0)):
         relation = sympy.log(A * 6) - sympy.log(2) - sympy.log(3) + sympy.Rational(str(extra))
-        setting = Setting(T, (P,), ({A: Fraction(1)},), relations=(relation,))
+        setting = Setting(T, (P,), samples=({A: Fraction(1)},), relations=(relation,))
         domain = Domain("all", 0, (Fraction(0),))
-        assert len(list(setting.places(Statement("1", 1, "smooth", domain, T, "")))) == expected
+        assert len(list(setting.sample_points(Statement("1", 1, "smooth", domain, T, "")))) == expected
 
 
 def audited(about: str, value: str, **changes: object):

@@ -305,6 +305,13 @@ def test_scales_times_and_digits_far_from_one() -> None:
         ({"value": []}, "length >= 1"),
         ({"value": [one("speed", 1, "1")]}, "quantity must be one of this motion; got 'speed'"),
         ({"value": [one("kovalevskaya", 1, "1")]}, "one of this motion"),
+        (
+            {"value": [one("omega", 1, "1"), one("power", 1, "1", "2")]},
+            "value 2 (component 1, t = 2): quantity must be one of this motion; got 'power'",
+        ),
+        ({"value": [one("gamma", 3, "1"), one("quaternion", 2, "1", "1/2")]}, "value 2 (component 2, t = 1/2): gamma"),
+        ({"value": [one("omega", 1, "1"), one("omega", 2, 1)]}, "value 2: number has to be text"),  # type: ignore[arg-type]
+        ({"value": [one("omega", 1, "1"), {"time": "0", "number": "1"}]}, "value 2 lacks the key quantity"),
         ({"value": [one("omega", 4, "1")]}, "no component 4"),
         ({"value": [one("energy", 2, "1")]}, "no component 2"),
         ({"value": [{"quantity": "gamma", "number": "1", "time": "0"}]}, "gamma of a component that is not named"),
@@ -336,6 +343,20 @@ def test_what_is_no_claim_of_numbers_says_what_is_wrong(changes: dict[str, Any],
     with pytest.raises(InputError) as error:
         judged([one("omega", 1, "0.1")], **changes)
     assert said in str(error.value)
+
+
+def test_an_error_found_while_a_file_is_audited_names_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "b.toml"
+    path.write_text(
+        'name = "x"\nkind = "value"\n[top]\ninertia = ["3", "2", "1"]\nweight = "1"\ncentre = ["1/2", "1/3", "1/5"]\n'
+        '[start]\nomega = ["1", "2", "3"]\ngamma = ["0", "0", "1"]\n'
+        '[[value]]\ntime = "3"\nquantity = "power"\nnumber = "1"\n'
+    )
+    cause, remedy = auditing.answer(str(path), "").error or ("", "")
+    assert cause.startswith(f"{path}: value 1 (component 1, t = 3): quantity must be one of this motion; got 'power'")
+    assert "energy" in remedy
+    about, _ = auditing.answer(str(path), "gyrostat").error or ("", "")
+    assert about.startswith(f"{path}: ")
 
 
 def test_a_rounded_gamma_is_taken_where_the_file_says_so() -> None:

@@ -115,5 +115,5 @@ def test_the_unit_sphere_is_connected_where_nothing_cuts_it(facts, weak, relatio
     known = Assumptions(T, facts=facts, weak=weak, relations=(*relations, sphere))
     field = Field(known, STATE)
     flow = Flow(lambda e: sympy.Integer(0), frozenset(STATE), always=(sphere,))
-    region = Region(field, Setting(T, (), ()), Statement("", 0, "", ALL, STATE[3], "", flow=flow), [])
+    region = Region(field, Setting(T), Statement("", 0, "", ALL, STATE[3], "", flow=flow), [])
     assert region.is_connected(used(field.enter(STATE[3] + STATE[4]).numerator)) is connected

@@ -370,7 +370,7 @@ def test_a_run_that_ends_early_says_so() -> None:
         ({"integrator": "scipy"}, "hands over no polynomial"),
         ({"digits": 0}, "digits must be from 1"),
         ({"digits": 10, "precision": ht.QUAD}, "know no precision"),
-        ({"limit": 0}, "allows nothing"),
+        ({"limit": 0}, "must be at least 1"),
     ],
 )
 def test_bad_input_is_named(changes, match) -> None:

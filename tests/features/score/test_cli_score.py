@@ -28,6 +28,8 @@ from heavytop.integrate.heyoka.motions import propagate
 from heavytop.precision import DOUBLE
 from heavytop.report.render.page import report_page
 
+pytestmark = pytest.mark.pictures
+
 CASE = CASES["lagrange"]
 TIMES = [Fraction(k) for k in range(1, 9)]
 

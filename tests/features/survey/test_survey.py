@@ -24,16 +24,18 @@ from heavytop.harness.plan import read
 from heavytop.harness.rows import failed
 from heavytop.harness.sweeps import Random, SweepGrid
 from heavytop.integrate.ensemble import propagate_ensemble
-from heavytop.integrate.multiword.lanes import Pairs
 from heavytop.integrate.registry import described
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import truth
+from heavytop.multiword.pairs import Pairs
 from heavytop.precision import DOUBLE, exact
 from heavytop.records import SCHEMA, Row
 from heavytop.report.compare.noise import Policy
 from support.in_process import heavytop
 from support.reports import compare
+
+pytestmark = pytest.mark.pictures
 
 TIMES = [Fraction(n) for n in (1, 2, 3)]
 SWEEP = """

@@ -37,8 +37,8 @@ from typing import Any
 from flint import acb, arb
 
 from heavytop.errors import NotInClass, OutOfReach
-from heavytop.exact.cases.kovalevskaya import Interval, along_gamma, level_vector, ordered, pole
-from heavytop.exact.cases.kovalevskaya_theta import KovalevskayaLevel, PhiRoot, WorkingStart, start_of
+from heavytop.exact.cases.kovalevskaya import Interval, along_gamma, interval_of, level_vector, pole
+from heavytop.exact.cases.kovalevskaya_theta import KovalevskayaLevel, PhiRoot, start_of
 from heavytop.exact.closed_form import (
     ClosedForm,
     WithAngles,
@@ -50,7 +50,7 @@ from heavytop.exact.closed_form import (
     tanh_sech,
 )
 from heavytop.exact.elliptic.quartic import PreparedMotion, QuarticMotion
-from heavytop.exact.flint.balls import BallLike, Undecided, ball, coefficient, current_length, series_length, to_bits
+from heavytop.exact.flint.balls import BallLike, ball, coefficient, current_length, series_length, to_bits
 from heavytop.exact.separable.abel import phase_at
 from heavytop.exact.separable.oscillation import Azimuth, Bearing, Gap, Roots, WithBearing
 from heavytop.exact.solution import SPIN_UPWARDS, XI, ExactRelation, apart, plane_top
@@ -99,7 +99,7 @@ class DeloneAzimuth:
         roots: Any = cubic.complex_roots()
         curve = [PhiRoot(acb(value), 1, True) for value, _ in roots]
         start = start_of(level)
-        interval = _interval(curve, start)
+        interval = interval_of(0, curve, start)
         # beyond the cubic's roots, or between them and 0, where the other variable rests
         mu, _ = pole([*curve, PhiRoot(acb(0), 2, False)], [interval])
         gap, offset = _gap(curve, interval, mu), ball(e) - mu
@@ -133,21 +133,6 @@ def _turned(level: KovalevskayaLevel, state: Sequence[arb]) -> list[arb]:
     for unit, (x, y, z) in ((level.rate, state[:3]), (level.size, state[3:])):
         vectors += [part / ball(unit) for part in ((n1 * x + n2 * y) / c, (n1 * y - n2 * x) / c, z)]
     return vectors
-
-
-def _interval(curve: list[PhiRoot], start: WorkingStart) -> Interval:
-    """Where w moves, as in :func:`heavytop.exact.cases.kovalevskaya.intervals`."""
-    real = ordered(curve)
-    allowed = [(real[0] + 1, 0)] + ([(real[2] + 1, real[1] + 1)] if len(real) == 3 else [])
-    columns = [
-        (upper, lower)
-        for upper, lower in allowed
-        if not start.above(0, curve[upper - 1].value.real) > 0
-        and not (lower > 0 and start.above(0, curve[lower - 1].value.real) < 0)
-    ]
-    if len(columns) != 1:
-        raise Undecided
-    return columns[0]
 
 
 def _gap(curve: list[PhiRoot], interval: Interval, mu: arb) -> Gap:

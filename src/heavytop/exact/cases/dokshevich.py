@@ -24,17 +24,16 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from flint import acb, arb, arb_series
+from flint import acb, arb
 
 from heavytop.errors import InputError, prefixed
 from heavytop.exact.cases.algebraic_starts import Algebraic
-from heavytop.exact.closed_form import ClosedForm, cached_per_precision, once, sign
+from heavytop.exact.closed_form import ClosedForm, cached_per_precision, once, sign, solved
 from heavytop.exact.flint.balls import (
     BallLike,
     Balls,
     Undecided,
     ball,
-    current_length,
     exponent,
     to_bits,
     whole_evaluation,
@@ -175,11 +174,8 @@ class _Moving(WithBearing):
 
     def evaluate(self, time: Fraction) -> list[BallLike]:
         swing, frame = _swing(self), _frame(self)
-        phase: BallLike = swing.phase(frame.rate * ball(time))[0]
-        for _ in range(current_length() - 1):
-            moving: Any = arb_series([phase], prec=current_length()) if isinstance(phase, arb) else phase
-            density = swing.gap.density(swing.gap.position(moving))
-            phase = arb_series([moving[0]], prec=current_length()) + (frame.rate / density).integral()
+        gap, (start, _) = swing.gap, swing.phase(frame.rate * ball(time))
+        (phase,) = solved([start], lambda now: [frame.rate / gap.density(gap.position(now[0]))])
         momentum, up = swing.state(phase)
         body, gamma = frame.body(momentum), frame.body(up)
         moments = map(ball, _data(self)[0])

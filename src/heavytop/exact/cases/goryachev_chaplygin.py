@@ -271,7 +271,7 @@ class GoryachevMotion:
         phases, turns = self.phases(time)
         with series_length(length):
             moving = self.line.series(phases, self._rates)
-            return self.level.restored(self.turned(moving, turns), length)
+            return self.level.restored(self.turned(moving, turns))
 
     def phases(self, time: Fraction) -> tuple[list[arb], list[int]]:
         """The phases at ``time`` in the first turns, and whole turns; see :meth:`Line.phases`."""
@@ -371,7 +371,7 @@ _GROWTH, _STEPS = 30.0, 200
 _ROUNDING = 1 + 1e-12
 """More than the rounding of a few sums and products of positive floats."""
 _ROOM = 0.45
-"""Of the way to the other gap that u1 and u2 may each go on the strips."""
+"""The part of the way to the other gap that u1 and u2 may go on the strips."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -54,7 +54,6 @@ from flint import acb, arb
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.cases.goryachev_chaplygin import GoryachevLevel, separated_start, size_of
-from heavytop.exact.cases.one_interval import in_units
 from heavytop.exact.closed_form import ClosedForm, cached_per_precision, constant, instant
 from heavytop.exact.elliptic.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.flint.balls import BallLike, Balls, Undecided, ball, series_length
@@ -105,8 +104,7 @@ class GoryachevChaplyginRest(WithBearing, ClosedForm):
     def evaluate(self, time: Fraction) -> list[BallLike]:
         motion = _motion(self)
         level = motion.level
-        state = motion.state(instant(level.rate * time))
-        return in_units([*level.in_body(state[:3]), *level.in_body(state[3:])], level.rate, level.size)
+        return level.restored(motion.state(instant(level.rate * time)))
 
     def bearing(self, time: Fraction) -> Bearing:
         """See :class:`heavytop.exact.separable.oscillation.WithBearing`: M, along γ × n at rest; not for h = a."""

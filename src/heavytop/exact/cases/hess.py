@@ -24,6 +24,7 @@ Source: W. Hess, Math. Ann. 37 (1890) 153; P. A. Nekrasov, Mat. sbornik 16 (1892
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -33,7 +34,6 @@ from flint import acb, arb, arb_mat, arb_series, fmpq_poly
 from heavytop.errors import LevelNotDone
 from heavytop.exact.cases.hess_transfer import System2, Transfer, plan
 from heavytop.exact.cases.lagrange import polynomial
-from heavytop.exact.cases.one_interval import in_units
 from heavytop.exact.cases.pendulum import Swing, swing
 from heavytop.exact.closed_form import (
     Carry,
@@ -42,7 +42,9 @@ from heavytop.exact.closed_form import (
     between,
     cached_per_precision,
     constant,
+    in_units,
     sign,
+    solved,
     tanh_sech,
 )
 from heavytop.exact.flint.balls import (
@@ -50,7 +52,6 @@ from heavytop.exact.flint.balls import (
     Balls,
     Undecided,
     ball,
-    current_length,
     exponent,
     midpoint,
     unit_of_time,
@@ -249,7 +250,7 @@ class HessMotion:
         phase, turns = self._phase(time)
         u, v = (self.matrix.at(phase, turns) * self.spinor).entries()
         scale = arb(2) ** -_exponent(abs(u) + abs(v))
-        return self._state(*self._moving(phase, u * scale, v * scale))
+        return self._state(*solved((phase, u * scale, v * scale), self._rates))
 
     def _phase(self, time: arb) -> tuple[arb, int]:
         return phase_at(self.gap, self.origin + time)
@@ -267,18 +268,11 @@ class HessMotion:
         phase, turns = self._phase(time)
         return Bearing.of(self.at(time)[3:], [ball(n) for n in self.level.moment], azimuth.at(phase, turns))
 
-    def _moving(self, phase: arb, u: arb, v: arb) -> tuple[BallLike, BallLike, BallLike]:
-        """(θ, u, v) as power series in t, from their differential equations."""
-        if current_length() == 1:
-            return phase, u, v
-        now: tuple[BallLike, ...] = tuple(arb_series([x], prec=current_length()) for x in (phase, u, v))
-        for _ in range(current_length() - 1):
-            rate = 1 / self.gap.density(self.gap.position(now[0]))
-            b, c = self.linear.entries(now[0])
-            slopes = rate, b * rate * now[2], c * rate * now[1]
-            now = tuple(x + slope.integral() for x, slope in zip((phase, u, v), slopes, strict=True))
-        moving, first, second = now
-        return moving, first, second
+    def _rates(self, now: Sequence[Any]) -> list[Any]:
+        """θ', u' and v'."""
+        rate = 1 / self.gap.density(self.gap.position(now[0]))
+        b, c = self.linear.entries(now[0])
+        return [rate, b * rate * now[2], c * rate * now[1]]
 
     def _state(self, phase: Balls, u: Balls, v: Balls) -> list[Balls]:
         s = self.gap.position(phase)

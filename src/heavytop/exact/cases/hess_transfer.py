@@ -283,10 +283,10 @@ def _series(
     for begin in range(0, length - 1, _BLOCK):
         with working_precision(max(_BOUND_BITS, bits + _GUARD - _RATIO_BITS * begin)):
             for n in range(begin, min(begin + _BLOCK, length - 1)):
-                for whole, quotient in zip(solution, over_p, strict=True):
-                    quotient.append(whole[-1] - p1 * quotient[-1] - p2 * quotient[-2])
-                for whole, quotient in zip(solution, over_w, strict=True):
-                    quotient.append(whole[-1] - quotient[-2])
+                for solution_values, quotient in zip(solution, over_p, strict=True):
+                    quotient.append(solution_values[-1] - p1 * quotient[-1] - p2 * quotient[-2])
+                for solution_values, quotient in zip(solution, over_w, strict=True):
+                    quotient.append(solution_values[-1] - quotient[-2])
                 own, other = half_q * v[-1] + q2 * v[-2], k_pq * (u_p[-1] + u_p[-3]) + skew_q * uu_w[-1]
                 for_v.append(own + other - q1 * for_v[-1] - q2 * for_v[-2])
                 own, other = half_q * w[-1] + q2 * w[-2], skew_pq * (u_w[-1] + p1 * u_w[-2] + p2 * u_w[-3])

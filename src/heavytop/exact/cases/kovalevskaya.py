@@ -81,27 +81,30 @@ def intervals(level: KovalevskayaLevel, curve: Sequence[PhiRoot], start: Working
     Raises Undecided where the balls do not tell.
     """
     resting = _resting(level, curve, start)
-    real = [i for i in ordered(curve) if i not in resting.values()]
+    first, second = (
+        (resting[k] + 1, resting[k] + 1) if k in resting else interval_of(k, curve, start, [*resting.values()])
+        for k in (0, 1)
+    )
+    return first, second
+
+
+def interval_of(variable: int, curve: Sequence[PhiRoot], start: WorkingStart, resting: Sequence[int] = ()) -> Interval:
+    """Where w1 (variable 0) or w2 moves, as :func:`intervals`; resting: roots where another variable stays."""
+    real = [i for i in ordered(curve) if i not in resting]
     allowed, inside = [(real[0] + 1, 0)], True
     for low, high in pairwise(real):
         inside ^= curve[low].multiplicity % 2 == 1
         if inside:
             allowed.append((high + 1, low + 1))
-
-    def possible(variable: int, interval: Interval) -> bool:
-        upper, lower = interval
-        below = lower > 0 and start.above(variable, curve[lower - 1].value.real) < 0
-        return not below and not start.above(variable, curve[upper - 1].value.real) > 0
-
-    intervals = [
-        [(resting[k] + 1, resting[k] + 1)]
-        if k in resting
-        else [interval for interval in allowed if possible(k, interval)]
-        for k in (0, 1)
+    possible = [
+        (upper, lower)
+        for upper, lower in allowed
+        if not (lower > 0 and start.above(variable, curve[lower - 1].value.real) < 0)
+        and not start.above(variable, curve[upper - 1].value.real) > 0
     ]
-    if any(len(choice) != 1 for choice in intervals):
+    if len(possible) != 1:
         raise Undecided
-    return intervals[0][0], intervals[1][0]
+    return possible[0]
 
 
 def _resting(level: KovalevskayaLevel, curve: Sequence[PhiRoot], start: WorkingStart) -> dict[int, int]:
@@ -218,7 +221,8 @@ class AbelMotion:
 
         Raises Undecided where the working precision does not prove the phases.
         """
-        return self.level.restored(self.reduced(*self.phases(time), length), length)
+        with series_length(length):
+            return self.level.restored(self.reduced(*self.phases(time), length))
 
     def phases(self, time: Fraction) -> tuple[list[arb], list[int]]:
         """The phases at ``time`` in the first turns, and whole turns; see :meth:`Line.phases`."""

@@ -25,12 +25,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 from itertools import combinations, product
 from typing import Any
 
 from flint import acb, acb_mat, acb_series, arb, arb_mat, arb_series, fmpq_poly
 
 from heavytop.exact.cases.lagrange import Reduced, polynomial
+from heavytop.exact.closed_form import solved
 from heavytop.exact.flint.balls import (
     BallLike,
     Undecided,
@@ -177,23 +179,14 @@ def start_of(level: KovalevskayaLevel) -> WorkingStart:
     c = ball(level.moment_square).sqrt()
     h, area, g = ball(level.energy), c * ball(level.area), ball(level.weight)
     with series_length(ORDERS):
-        motion = _flow(c, level.turned())
+        field = partial(heavy_top, Parameters((2, 2, 1), (c, arb(0), arb(0)), arb(0)))
+        motion = tuple(solved(level.turned(), field))
         p, q = motion[:2]
         a, b, s = p * p - q * q, 2 * (p * q), p * p + q * q
         real, imaginary = b * b - a * a + 2 * h * a - 2 * area * p + g, 2 * (h * b - a * b - area * q)
         upper = -s * s + 2 * h * s - 2 * area * p + g + (real * real + imaginary * imaginary).sqrt()
         lower = 2 * h * s * s - 4 * area * (s * p) + 4 * g * (p * p) + (area * area - 2 * g * h)
     return WorkingStart(c, h, area, g, motion, lower, upper, level.across(level.omega) == 0)
-
-
-def _flow(c: arb, start: list[arb]) -> tuple[BallLike, ...]:
-    """The power series of the motion from the start, by Picard's iteration on the field itself."""
-    parameters = Parameters((2, 2, 1), (c, arb(0), arb(0)), arb(0))
-    motion = [arb_series([value], prec=current_length()) for value in start]
-    for _ in range(current_length() - 1):
-        rates = heavy_top(parameters, motion)
-        motion = [value + arb_series(rate).integral() for value, rate in zip(start, rates, strict=True)]
-    return tuple(motion)
 
 
 def linear(start: WorkingStart, values: Sequence[acb]) -> tuple[list[acb], list[acb], acb_mat]:
@@ -416,7 +409,8 @@ class ThetaMotion:
             half = 1 / (2 * below)
             parts = above * half, thetas[_number(_DELTA)] * half * -_I, spin * half * (4 * _I)
             velocity = [real_part(part) for part in parts]
-        return self.level.restored(self.start.state(velocity, length), length)
+        with series_length(length):
+            return self.level.restored(self.start.state(velocity, length))
 
     def reduced(self, z: acb_mat) -> acb_mat:
         """z modulo twice the periods."""

@@ -34,7 +34,7 @@ from fractions import Fraction
 from functools import partial
 from typing import Any, Self
 
-from flint import acb, arb, arb_series, fmpq_poly
+from flint import acb, arb, fmpq_poly
 
 from heavytop.exact.closed_form import (
     ClosedForm,
@@ -42,6 +42,7 @@ from heavytop.exact.closed_form import (
     balls,
     cached_per_precision,
     carried_xi,
+    in_units,
     initial_xi,
     instant,
     once,
@@ -420,12 +421,9 @@ class Reduced:
         x, y, z = vector
         return [cosine * x - sine * y, sine * x + cosine * y, z]
 
-    def restored(self, motion: Sequence[Any], length: int) -> list[BallLike]:
-        """Six series in t', in the turned frame, as numbers or series in t of that length, in the top's own units."""
-        rate, size = ball(self.rate), ball(self.size)
-        omega, gamma = self.in_body(motion[:3]), self.in_body(motion[3:])
-        rows = [[rate ** (n + 1) * x[n] for x in omega] + [rate**n * size * x[n] for x in gamma] for n in range(length)]
-        return rows[0] if length == 1 else [arb_series(list(row), prec=length) for row in zip(*rows, strict=True)]
+    def restored(self, motion: Sequence[Any]) -> list[Any]:
+        """Six series in t', or numbers, in the turned frame in the top's own units: :func:`in_units`."""
+        return in_units([*self.in_body(motion[:3]), *self.in_body(motion[3:])], self.rate, self.size)
 
 
 def polynomial(*coefficients: Fraction) -> fmpq_poly:

@@ -24,17 +24,16 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
-from flint import acb, arb, arb_series, fmpq, fmpq_poly
+from flint import acb, arb, fmpq, fmpq_poly
 
 from heavytop.errors import NotInClass
 from heavytop.exact.cases.lagrange import polynomial
-from heavytop.exact.closed_form import ClosedForm, cached_per_precision
+from heavytop.exact.closed_form import ClosedForm, cached_per_precision, in_units, solved
 from heavytop.exact.flint.balls import (
     BallLike,
     Balls,
     Undecided,
     ball,
-    current_length,
     current_precision,
     midpoint,
     rational,
@@ -182,7 +181,8 @@ class OneGapMotion:
         Raises Undecided where the working precision does not prove the phase.
         """
         phase, turns = self._phase(time)
-        return self._state(self._moving(phase), turns)
+        (moving,) = solved([phase], lambda now: [1 / self.gap.density(self.gap.position(now[0]))])
+        return self._state(moving, turns)
 
     def _phase(self, time: arb) -> tuple[arb, int]:
         return phase_at(self.gap, self.origin + time)
@@ -207,15 +207,6 @@ class OneGapMotion:
         vector = [a * x ** (self.curve.power - self.curve.power // 2), b * q, c * r]
         return Bearing.of([s, q * t, r * u], vector, azimuth.at(phase, turns))
 
-    def _moving(self, phase: arb) -> BallLike:
-        """The phase as a power series in t, from its differential equation."""
-        if current_length() == 1:
-            return phase
-        moving: BallLike = arb_series([phase], prec=current_length())
-        for _ in range(current_length() - 1):
-            moving = phase + (1 / self.gap.density(self.gap.position(moving))).integral()
-        return moving
-
     def _square_roots(self, phase: Balls, turns: int) -> tuple[Balls, Balls]:
         """√Q and √R."""
         x, halves = self.gap.position(phase), self.gap.ends(phase)
@@ -238,18 +229,6 @@ def horner(polynomial: fmpq_poly, x: Balls) -> Balls:
     for coefficient in reversed(polynomial.coeffs()):
         total = total * x + arb(coefficient)
     return total
-
-
-def in_units(motion: Sequence[Any], rate: Fraction, size: Fraction) -> list[BallLike]:
-    """Ω and γ, series in t' or numbers, as those in t = t'/rate of Ω times ``rate`` and γ times ``size``."""
-    units = [ball(rate)] * 3 + [ball(size)] * 3
-    if current_length() == 1:
-        return [unit * component for unit, component in zip(units, motion, strict=True)]
-    factors = [ball(rate**n) for n in range(current_length())]
-    return [
-        arb_series([unit * factor * component[n] for n, factor in enumerate(factors)], prec=len(factors))
-        for unit, component in zip(units, motion, strict=True)
-    ]
 
 
 @whole_evaluation

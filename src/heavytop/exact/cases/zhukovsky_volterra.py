@@ -266,10 +266,10 @@ def _exact(case: ZhukovskyVolterra) -> _Exact:
             equations.append(line)
     solution = _kernel(equations)
     groups = [tuple(solution[start : start + 5]) for start in (0, 5, 10, 15)]
-    whole = tuple(
+    denominator_series = tuple(
         sum((d * row[power] for d, row in zip(groups[0], basis, strict=True)), Fraction(0)) for power in range(size)
     )
-    return _Exact(groups[0], tuple(groups[1:]), whole)
+    return _Exact(groups[0], tuple(groups[1:]), denominator_series)
 
 
 def _times_taylor(laurent: Sequence[Fraction], series: Sequence[Fraction]) -> list[Fraction]:

@@ -53,35 +53,25 @@ Pair = tuple[Fraction, Fraction]
 class QuarticMotion:
     """The motion x'² = f(x) from x(0) = start, x'(0) = speed.
 
-    coefficients: of 1, x, x², x³, x⁴ (fewer for a lower degree).  Exact numbers or balls; speed² = f(start) is the
-    caller's promise.  x must stay finite for all real times that are asked for, else the result is not finite.
+    coefficients: of 1, x, x², x³, x⁴ (fewer for a lower degree).  speed² = f(start) is the caller's promise.
+    x must stay finite for all real times that are asked for, else the result is not finite.
     """
 
-    coefficients: tuple[Scalar, ...]
-    start: Scalar
-    speed: Scalar
+    coefficients: tuple[Fraction, ...]
+    start: Fraction
+    speed: Fraction
 
-    def _numbers(self, *values: Scalar) -> list[Any]:
-        """The values in one ring: Fractions, or balls as soon as one of the motion's own numbers is a ball."""
-        balls = any(isinstance(own, arb) for own in (*self.coefficients, self.start))
-        return [value if isinstance(value, arb) else ball(value) if balls else Fraction(value) for value in values]
-
-    def derivatives(self) -> tuple[Any, ...]:
+    def derivatives(self) -> tuple[Fraction, ...]:
         """f and its first four derivatives at the start."""
-        row = self._numbers(*self.coefficients)
-        start, zero = self._numbers(self.start, 0)
-        values = []
+        row, values = list(self.coefficients), []
         for _ in range(5):
-            value = zero
-            for coefficient in reversed(row):
-                value = value * start + coefficient
-            values.append(value)
+            values.append(sum((c * self.start**n for n, c in enumerate(row)), Fraction(0)))
             row = [coefficient * index for index, coefficient in enumerate(row)][1:]
         return tuple(values)
 
-    def invariants(self) -> tuple[Any, Any]:
+    def invariants(self) -> tuple[Fraction, Fraction]:
         """(g2, g3) of f."""
-        row = self._numbers(*self.coefficients, 0, 0, 0, 0, 0)[:5]
+        row = (*self.coefficients, *[Fraction(0)] * 5)[:5]
         a4, a3, a2, a1, a0 = (coefficient / weight for coefficient, weight in zip(row, (1, 4, 6, 4, 1), strict=True))
         g2 = a0 * a4 - 4 * a1 * a3 + 3 * a2 * a2
         g3 = a0 * a2 * a4 + 2 * a1 * a2 * a3 - a2 * a2 * a2 - a0 * a3 * a3 - a1 * a1 * a4
@@ -193,7 +183,7 @@ class PreparedMotion:
 
 
 Factors = tuple[Any, ...]
-"""What Φ T times (T³, ℘T³, ℘'T³) and Φ' T² times (T², ℘T²) are multiplied by in an F of the second theorem."""
+"""Factors of Φ T times (T³, ℘T³, ℘'T³) and of Φ' T² times (T², ℘T²) in an F of the second theorem."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,14 +199,14 @@ class Companions:
         if self.still:
             return [lift(point.scale * 0)] * len(self.factors)
         phi, slope = map(lift, self.wave.at(point))
-        whole = lift(inverse)
-        phi, slope, square = phi * whole, slope * whole, lift(point.square)
+        factor = lift(inverse)
+        phi, slope, square = phi * factor, slope * factor, lift(point.square)
         # a complex ball times a real one is quick in this order only
         low, steep = phi * lift(point.scale), phi * lift(point.slope)
         if isinstance(self.wave.lattice, DegenerateLattice):
             rest = slope
             if self.wave.index is None:
-                rest = -exponential(point.time, self.wave.rate) * whole
+                rest = -exponential(point.time, self.wave.rate) * factor
             # Φ' T² = K T ΦT − e: its K T ΦT stands in the cubic coefficient
             parts = low * square, low, steep, rest * square, slope
         else:

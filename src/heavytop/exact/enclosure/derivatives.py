@@ -33,10 +33,10 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import exp, inf, lcm
 from operator import mul
-from typing import Protocol, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
-from flint import arb, fmpz, fmpz_mat
+from flint import arb, fmpq, fmpq_series, fmpz, fmpz_mat
 from gmpy2 import mpq, mpz
 
 from heavytop.errors import Contradiction, OutOfReach
@@ -56,12 +56,20 @@ from heavytop.exact.enclosure.step import (
     quadratic,
     start_node,
 )
-from heavytop.exact.flint.balls import ball, relative_bits, whole_evaluation, working_precision
+from heavytop.exact.flint.balls import (
+    ball,
+    coefficient,
+    rational,
+    relative_bits,
+    series_length,
+    whole_evaluation,
+    working_precision,
+)
 from heavytop.multiword.codegen.recurrence import Coefficients, coefficients_of
 from heavytop.multiword.codegen.recurrence import rates as lane_rates
 from heavytop.multiword.fixed_point.arithmetic import Grid
 from heavytop.multiword.fixed_point.certified_series import CertifiedSeries, WordSeries
-from heavytop.multiword.fixed_point.first_variation import CertifiedColumns
+from heavytop.multiword.fixed_point.first_variation import CertifiedColumns, WordColumns
 from heavytop.multiword.fixed_point.fixed_point_run import excess
 from heavytop.multiword.integers.integer_series import QuadraticComponent, coefficients
 from heavytop.precision import decimal_text
@@ -154,29 +162,6 @@ class Tangent:
         return self.field.dimension + len(self.data)
 
 
-class Columns(Protocol):
-    """Columns as polynomials, in whole ulps: in words, or made of exact integers."""
-
-    @property
-    def total(self) -> list[list[int]]:
-        """Σ v_n, the components of each column."""
-
-    @property
-    def values(self) -> list[list[list[int]]] | None:
-        """Every v_n, where they were asked for."""
-
-    @property
-    def sizes(self) -> Matrix:
-        """Upper bounds of |v_n|, shape (columns, N + 1)."""
-
-    @property
-    def rounding(self) -> tuple[float, float]:
-        """Upper bounds of Σ_(n < N) ρ_n in ulps, of the columns of Φ and of those of σ."""
-
-    def scaled(self, rate: int) -> Matrix:
-        """Upper bounds of 2^(rate n) |v_n|."""
-
-
 @dataclass(frozen=True)
 class _WholeColumns:
     """Columns in exact integers, each rounded once.
@@ -205,6 +190,9 @@ class _WholeColumns:
 
     def scaled(self, rate: int) -> Matrix:
         return np.array([Whole(column, self.precision).scaled(rate) for column in self.values])
+
+
+Columns: TypeAlias = _WholeColumns | WordColumns
 
 
 @dataclass(frozen=True, slots=True)
@@ -321,7 +309,7 @@ def unit_columns(size: int, bits: int, columns: int) -> list[list[mpz]]:
 
 # The derivatives of a vector field with respect to the data that enter it, from the field itself.
 #
-# A field of :mod:`heavytop.top.equations` is evaluated over numbers a + b ε with ε² = 0: the coefficient of ε is its
+# A field of :mod:`heavytop.top.equations` is evaluated over power series a + b ε + ...: the coefficient of ε is its
 # derivative, exactly.  No derivative is written down a second time.
 
 
@@ -329,61 +317,25 @@ DATA = ("I1", "I2", "I3", "n1", "n2", "n3")
 """The data that motions are differentiated with respect to: principal moments, and n = P r."""
 
 
-Exact: TypeAlias = int | Fraction | mpq
-
-
-@dataclass(frozen=True, slots=True)
-class Dual:
-    """value + slope ε with ε² = 0, over exact numbers."""
-
-    value: Exact
-    slope: Exact = 0
-
-    @classmethod
-    def of(cls, number: Dual | Exact) -> Dual:
-        """A number, as one without slope."""
-        return number if isinstance(number, Dual) else cls(number)
-
-    def __add__(self, other: Dual | Exact) -> Dual:
-        b = Dual.of(other)
-        return Dual(self.value + b.value, self.slope + b.slope)
-
-    __radd__ = __add__
-
-    def __neg__(self) -> Dual:
-        return Dual(-self.value, -self.slope)
-
-    def __sub__(self, other: Dual | Exact) -> Dual:
-        return self + -Dual.of(other)
-
-    def __rsub__(self, other: Dual | Exact) -> Dual:
-        return Dual.of(other) + -self
-
-    def __mul__(self, other: Dual | Exact) -> Dual:
-        b = Dual.of(other)
-        return Dual(self.value * b.value, self.slope * b.value + self.value * b.slope)
-
-    __rmul__ = __mul__
-
-    def __truediv__(self, other: Dual | Exact) -> Dual:
-        b = Dual.of(other)
-        return Dual(self.value / b.value, (self.slope * b.value - self.value * b.slope) / (b.value * b.value))
-
-    def __rtruediv__(self, other: Dual | Exact) -> Dual:
-        return Dual.of(other) / self
-
-
-def moved(p: Parameters, datum: int, by: Dual | Exact) -> Parameters:
+def moved(p: Parameters, datum: int, by: Any) -> Parameters:
     """The parameters with ``by`` added to one of :data:`DATA`."""
     numbers = [*p.inertia, *p.moment]
     numbers[datum] = numbers[datum] + by
     return p._replace(inertia=tuple(numbers[:3]), moment=tuple(numbers[3:]))
 
 
-def slope(system: System, p: Parameters, datum: int, unit: mpq) -> Callable[[Sequence[mpq]], list[mpq]]:
+def slope(system: System, p: Parameters, datum: int, unit: Fraction) -> Callable[[Sequence[mpq]], list[mpq]]:
     """``unit`` ∂f/∂θ for one of :data:`DATA`."""
-    varied = moved(p, datum, Dual(mpq(0), unit))
-    return lambda y: [mpq(Dual.of(rate).slope) for rate in system.field(varied, tuple(y))]
+
+    @whole_evaluation
+    def rates(y: Sequence[mpq]) -> list[mpq]:
+        with series_length(2):
+            varied = moved(p.mapped(rational), datum, fmpq_series([0, rational(unit)]))
+            state = [fmpq(int(value.numerator), int(value.denominator)) for value in y]
+            slopes = [coefficient(fmpq_series(rate), 1) for rate in system.field(varied, state)]
+        return [mpq(int(slope.p), int(slope.q)) for slope in slopes]
+
+    return rates
 
 
 METHOD = "validated: variational equation on the Taylor enclosure"
@@ -526,12 +478,12 @@ def _tangent(
 def _datum(known: Validated, motion: ScaledMotion, datum: int) -> tuple[Datum, Coefficients | None]:
     """A datum, and its G over the lanes of the motion; None where they do not compute it."""
     scaled = motion.scaled
-    own, sign = own_parameters(scaled, known.parameters).mapped(mpq), 1 if motion.forwards else -1
-    largest = coefficients_of(scaled.system, slope(scaled.system, own, datum, mpq(1)), mpq(0)).largest
+    own, sign = own_parameters(scaled, known.parameters).mapped(Fraction), 1 if motion.forwards else -1
+    largest = coefficients_of(scaled.system, slope(scaled.system, own, datum, Fraction(1)), mpq(0)).largest
     unit = Fraction(2) ** (excess(scaled) - _SMALLER)
     if largest:
         unit /= Fraction(2) ** (largest.numerator.bit_length() - largest.denominator.bit_length() + 1)
-    rates = slope(scaled.system, own, datum, mpq(unit))
+    rates = slope(scaled.system, own, datum, unit)
     lanes = coefficients_of(scaled.system, rates, mpq(0))
     field = quadratic(lambda y: [sign * rate for rate in rates(y)], 6)
     by_lanes = quadratic(lambda y: [sign * rate for rate in lane_rates(scaled.system, lanes, y)], 6)

@@ -31,6 +31,7 @@ from flint import arb, arb_series
 from gmpy2 import mpq
 
 from heavytop.errors import Contradiction, OutOfReach
+from heavytop.exact.closed_form import solved
 from heavytop.exact.enclosure.step import (
     Matrix,
     Node,
@@ -372,9 +373,9 @@ def own_parameters(scaled: Scaled, p: Parameters) -> Parameters:
 
 def _ladder(bits: float) -> int:
     """Multiples of an eighth of the power of two below."""
-    whole = max(64, ceil(bits))
-    unit = 1 << max(4, whole.bit_length() - 4)
-    return -(-whole // unit) * unit
+    least = max(64, ceil(bits))
+    unit = 1 << max(4, least.bit_length() - 4)
+    return -(-least // unit) * unit
 
 
 _PILOT_BITS = 128
@@ -490,28 +491,14 @@ class Validated:
         return self._enclosure(time, bits, (*self.start.flat, *xi))
 
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
-        """See :class:`heavytop.exact.solution.ExactSolution`: the recurrence of Taylor's series on the enclosure."""
+        """See :class:`heavytop.exact.solution.ExactSolution`: the field's own series from the enclosure."""
         return self._extended(self.state(time, bits + 4 * length), length, bits)
 
     @whole_evaluation
     def _extended(self, values: list[arb], length: int, bits: int) -> list[arb_series]:
-        motion = self._motion(1, self.start.flat)
-        pairs, rows, sizes, rate = motion.field.pairs, motion.field.rows, motion.scaled.sizes, motion.scaled.rate
-        with working_precision(bits + 4 * length + 32 + abs(exponent(rate)), length):
-            y = [[value / ball(size)] for value, size in zip(values, sizes, strict=True)]
-            for n in range(length - 1):
-                sums = [sum((y[j][m] * y[k][n - m] for m in range(n + 1)), arb(0)) for j, k in pairs]
-                last = [component[n] for component in y]
-                for component, row in zip(y, rows, strict=True):
-                    total = sum((c * sums[pair] for c, pair in row.products), arb(0))
-                    total += sum((c * last[j] for c, j in row.linear), arb(0))
-                    component.append(total / (row.denominator * (n + 1)))
-            # in the unit of time given, ε^n counts rate^n
-            unit = ball(rate)
-            return [
-                arb_series([c * ball(size) * unit**n for n, c in enumerate(component)], prec=length)
-                for component, size in zip(y, sizes, strict=True)
-            ]
+        with working_precision(bits + 4 * length + 32 + abs(self.unit), length):
+            parameters = self.parameters.mapped(ball)
+            return solved(values, lambda y: self.system.field(parameters, y))
 
     def motion(self, direction: int) -> ScaledMotion:
         """That of (Ω, γ) in units of its own, forwards or backwards in time."""

@@ -42,14 +42,14 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, lru_cache
 from math import exp, inf, isfinite, lcm, log2
-from typing import NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from flint import arb, fmpz, fmpz_poly
 from gmpy2 import mpq, mpz
 from numpy.typing import NDArray
 
-from heavytop.multiword.fixed_point.certified_series import CertifiedSeries
+from heavytop.multiword.fixed_point.certified_series import CertifiedSeries, WordSeries
 from heavytop.multiword.integers.integer_series import QuadraticComponent, QuadraticField, coefficients
 from heavytop.multiword.problem import variation as variation_of
 
@@ -146,47 +146,6 @@ def _rounded(value: Fraction) -> float:
 # The Taylor polynomial of a step: whole coefficients, with what its proof needs to know of them.
 
 
-# relative room for the rounding of a bound
-
-
-class StepSeries(Protocol):
-    """b_0, …, b_N of every component, in whole ulps.
-
-    Made of exact integers (:class:`Whole`) or on a grid of words
-    (:class:`heavytop.multiword.fixed_point.certified_series.WordSeries`).
-    """
-
-    @property
-    def thrifty(self) -> tuple[float, float]:
-        """Orders a bit between which a unit of time costs least."""
-
-    @property
-    def order(self) -> int:
-        """N."""
-
-    @property
-    def rounding(self) -> float:
-        """A bound, in ulps, of Σ_(n < N) |b_(n+1) − h f_n/(n + 1)|, in the maximum norm."""
-
-    @property
-    def values(self) -> list[list[int]]:
-        """The coefficients of each component."""
-
-    @property
-    def total(self) -> Sequence[int]:
-        """Σ b_n, exactly: what the next step begins at, as it stands."""
-
-    @property
-    def sizes(self) -> Matrix:
-        """Upper bounds of β_n = |b_n|, as numbers; shape (N + 1,)."""
-
-    def scaled(self, rate: int) -> Matrix:
-        """Upper bounds of 2^(rate n) β_n, as numbers."""
-
-    def rounded(self, orders: int) -> Matrix:
-        """b_0 to b_orders in binary64, as many as there are, within 2^-50 of ``sizes`` plus 2^-199."""
-
-
 @dataclass(frozen=True)
 class Whole:
     """Coefficients of :func:`heavytop.multiword.integers.integer_series.coefficients`, each rounded to nearest."""
@@ -236,6 +195,15 @@ class Whole:
         shift = max(0, self.precision - 200)
         short = [[float(value >> shift) for value in component[: orders + 1]] for component in self.values]
         return np.asarray(np.ldexp(np.array(short).T, shift - self.precision))
+
+
+StepSeries: TypeAlias = Whole | WordSeries
+"""b_0, …, b_N of every component, in whole ulps: of exact integers, or on a grid of words.
+
+thrifty: orders a bit between which a unit of time costs least.  rounding: a bound, in ulps, of
+Σ_(n < N) |b_(n+1) − h f_n/(n + 1)|.  total: Σ b_n, exactly.  sizes, scaled: upper bounds of β_n and of 2^(rate n) β_n.
+rounded: b_0 to b_orders in binary64, within 2^-50 of ``sizes`` plus 2^-199.
+"""
 
 
 def lacking(motion: QuadraticField, series: StepSeries, precision: int, halvings: int) -> list[Fraction]:
@@ -537,8 +505,8 @@ def in_other_bits(field: Quadratic, taken: Step, precision: int, certified: Cert
         return None
     bound = max(tail.bound, float(np.ldexp(taken.widest_ulps, smaller)) + _TINY)
     widest = max(tail.widest, taken.widest)
-    kept = replace(taken, node=rounded, precision=precision, series=series, widest=widest, widest_ulps=bound)
-    return kept if widest < CAP else None
+    in_bits = replace(taken, node=rounded, precision=precision, series=series, widest=widest, widest_ulps=bound)
+    return in_bits if widest < CAP else None
 
 
 def defect_bound(series: StepSeries, precision: int, quadratic: float, linear: float) -> float:

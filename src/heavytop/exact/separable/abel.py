@@ -15,77 +15,31 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import ceil, expm1, log
-from typing import Any, NamedTuple, NoReturn, Protocol, Self
+from typing import Any, NamedTuple, NoReturn, Self, TypeAlias
 
-import numpy as np
-from flint import arb, arb_mat, arb_series, fmpq
-from numpy.typing import NDArray
+from flint import arb, arb_mat, fmpq
 
 from heavytop.errors import LevelNotDone, OutOfReach
+from heavytop.exact.closed_form import solved
 from heavytop.exact.flint.balls import (
     Balls,
     Undecided,
-    current_length,
     current_precision,
     nearest_integer,
     working_precision,
 )
 from heavytop.exact.separable.oscillation import Approach, Gap, Roots
 
-_FLOAT_BITS = 52
-_ITERATIONS, _SHORTEST, _SETTLED = 100, 1e-4, 1e-13
+_FEW_BITS = 53
+_ITERATIONS, _SHORTEST, _SETTLED = 100, 1e-4, 1e-6
 _REPEATED = 6
-
-
-class Variable(Protocol):
-    """A variable of an :class:`Inversion`: swinging (:class:`heavytop.exact.separable.oscillation.Gap`), or tending to
-    a double root.
-
-    turn: its phase grows by this and its integrals by ``column`` with every turn; for a variable that never returns,
-    what its integrals grow by with every unit of the phase, at last.  periodic: which of both.  middle: of its gap.
-    """
-
-    turn: float
-    periodic: bool
-    middle: arb
-
-    @property
-    def column(self) -> list[arb]: ...
-
-    def position(self, phase: Balls) -> Balls:
-        """v at the phase, a number or series."""
-        ...
-
-    def density(self, v: Balls) -> Balls:
-        """dF_0 by dphase, > 0."""
-        ...
-
-    def ends(self, phase: Balls) -> tuple[Balls, Balls]:
-        """√(v − lo) and √(hi − v), each with a sign that makes it analytic."""
-        ...
-
-    def bend(self, phase: Balls) -> Balls:
-        """−dv/dphase over the product of :meth:`ends`."""
-        ...
-
-    def phase(self, v: arb, slope: arb) -> arb:
-        """The phase where the variable is v and dv/dphase is ``slope``."""
-        ...
-
-    def integrals(self, phase: arb) -> list[arb]:
-        """F_j at the phase."""
-        ...
-
-    def estimates(self, phase: float) -> NDArray[np.float64]:
-        """F_j in floats."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
 class Inversion:
     """G of one or two variables; signs: ε."""
 
-    variables: tuple[Variable, ...]
+    variables: tuple[Moving, ...]
     signs: tuple[int, ...]
 
     def values(self, phases: Sequence[arb]) -> list[arb]:
@@ -127,54 +81,47 @@ class Inversion:
             cells = periods.solve(aim).entries()
         except ZeroDivisionError:
             return lost
-        turns = [nearest_integer(cell) if v.periodic else 0 for v, cell in zip(self.variables, cells, strict=True)]
-        rest = aim - periods * arb_mat([[n] for n in turns])
-        first = [float(c - n) * v.turn for v, c, n in zip(self.variables, cells, turns, strict=True)]
         if not all(cell.is_finite() for cell in cells):
             return lost
+        turns = [nearest_integer(cell) if v.periodic else 0 for v, cell in zip(self.variables, cells, strict=True)]
+        rest = aim - periods * arb_mat([[n] for n in turns])
+        first = [(c - n) * v.turn for v, c, n in zip(self.variables, cells, turns, strict=True)]
         try:
-            with np.errstate(all="ignore"):
-                estimated = self._estimated(first, rest)
-            return self._refined(estimated, rest), turns
-        except (ZeroDivisionError, np.linalg.LinAlgError):
+            return self._refined(self._estimated(first, rest), rest), turns
+        except ZeroDivisionError:
             return lost
 
-    def _estimated(self, phases: list[float], rest: arb_mat) -> list[float]:
-        """Newton's iteration in floats, every step as short as it must be to come nearer."""
-        aim, signs = np.array([float(r) for r in rest.entries()]), np.array(self.signs, float)
+    def _defect(self, phases: Sequence[arb], target: arb_mat) -> arb_mat:
+        return arb_mat([[value] for value in self.values(phases)]) - target
 
-        def defect(at: NDArray[np.float64]) -> NDArray[np.float64]:
-            total = -aim
-            for sign, variable, phase in zip(signs, self.variables, at, strict=True):
-                total = total + sign * variable.estimates(float(phase))
-            return total
+    def _estimated(self, phases: list[arb], rest: arb_mat) -> list[arb]:
+        """Newton's iteration in few bits, every step as short as it must be to come nearer."""
+        with working_precision(_FEW_BITS):
+            now = [phase.mid() for phase in phases]
+            defect = self._defect(now, rest)
+            for _ in range(_ITERATIONS):
+                step, share, error = (self._inverse(now) * defect).entries(), arb(1), _size(defect)
+                while True:
+                    following = [(x - share * s).mid() for x, s in zip(now, step, strict=True)]
+                    defect = self._defect(following, rest)
+                    if not _size(defect) > error or share < _SHORTEST:
+                        break
+                    share /= 2
+                now = following
+                if all(abs(s * share) < _SETTLED * (1 + abs(x)) for s, x in zip(step, now, strict=True)):
+                    break
+        return now
 
-        now = np.array(phases)
-        error = defect(now)
-        for _ in range(_ITERATIONS):
-            with working_precision(53):
-                slopes = np.array(self.slopes([arb(float(x)) for x in now]).entries(), float).reshape(len(now), -1)
-            step, share = np.linalg.solve(slopes, error), 1.0
-            following = defect(now - step)
-            while np.abs(following).sum() > np.abs(error).sum() and share > _SHORTEST:
-                share /= 2
-                following = defect(now - share * step)
-            now, error = now - share * step, following
-            if np.abs(share * step).max() < _SETTLED * (1 + np.abs(now).max()):
-                break
-        return [float(x) for x in now]
-
-    def _refined(self, phases: list[float], rest: arb_mat) -> list[arb]:
+    def _refined(self, near: list[arb], rest: arb_mat) -> list[arb]:
         """Newton's iteration in balls at growing precision, and the proof at the last."""
         needed, precisions = current_precision() // 2 + 8, []
-        while needed > _FLOAT_BITS:
+        while needed > _FEW_BITS:
             precisions.append(needed)
             needed = needed // 2 + 8
-        near = [arb(x) for x in phases]
         for precision in reversed(precisions):
             with working_precision(precision):
                 for _ in range(_REPEATED):
-                    step = (self._inverse(near) * (arb_mat([[v] for v in self.values(near)]) - rest)).entries()
+                    step = (self._inverse(near) * self._defect(near, rest)).entries()
                     near = [(x - s).mid() for x, s in zip(near, step, strict=True)]
                     # the next one would be of the size of its square
                     if all(abs(s) < arb(2) ** (8 - precision // 2) for s in step):
@@ -187,7 +134,7 @@ class Inversion:
     def _proven(self, near: list[arb], rest: arb_mat) -> list[arb]:
         """Krawczyk's image of a box around the phases, if it lies inside the box."""
         inverse = self._inverse(near)
-        step = (inverse * (arb_mat([[v] for v in self.values(near)]) - rest)).entries()
+        step = (inverse * self._defect(near, rest)).entries()
         floor = arb(2) ** (-current_precision())
         for widening in (2, 16, 256):
             off = [arb(0, (widening * (abs(s).upper() + floor)).upper()) for s in step]
@@ -202,7 +149,11 @@ class Inversion:
         return [arb("nan")] * len(near)
 
 
-def phase_at(variable: Variable, moment: arb) -> tuple[arb, int]:
+def _size(column: arb_mat) -> arb:
+    return sum((abs(value).mid() for value in column.entries()), arb(0))
+
+
+def phase_at(variable: Moving, moment: arb) -> tuple[arb, int]:
     """θ and whole turns of a single variable whose G is ``moment``; raises Undecided where that is not proven."""
     (phase,), (turns,) = Inversion((variable,), (1,)).phases([moment])
     if not phase.is_finite():
@@ -221,14 +172,10 @@ def phase_at(variable: Variable, moment: arb) -> tuple[arb, int]:
 
 
 class Rest:
-    """The variable at rest at ``point``; its phase stays 0."""
+    """The variable at rest at ``middle``; its phase stays 0."""
 
-    turn = 1.0
-    periodic = False
-
-    def __init__(self, point: arb) -> None:
-        self.middle = point
-        self.column = [arb(0), arb(0)]
+    def __init__(self, middle: arb) -> None:
+        self.middle = middle
 
     def position(self, phase: Balls) -> Balls:
         return phase * 0 + self.middle
@@ -248,39 +195,42 @@ class Rest:
         """0."""
         return arb(0)
 
-    def integrals(self, phase: arb) -> list[arb]:
-        return [arb(0), arb(0)]
-
-    def estimates(self, phase: float) -> NDArray[np.float64]:
-        return np.zeros(2)
-
 
 class RestingVariable:
-    """``variable`` with the one integral H for a variable at rest at ``point``, outside its gap."""
+    """``variable`` with the one integral H for a variable at rest at ``place``, outside its gap."""
 
-    def __init__(self, variable: Variable, point: arb) -> None:
-        self.variable, self.place = variable, point
-        self.turn, self.periodic, self.middle = variable.turn, variable.periodic, variable.middle
-        self.position, self.ends = variable.position, variable.ends
-        self.bend, self.phase = variable.bend, variable.phase
+    def __init__(self, variable: Gap | Approach, place: arb) -> None:
+        self.variable, self.place = variable, place
+        self.turn, self.periodic, self.position = variable.turn, variable.periodic, variable.position
 
-    def _combined(self, first: Balls, second: Balls) -> Balls:
-        return second - first * self.place
+    def _combined(self, first: arb, second: arb) -> list[arb]:
+        return [second - first * self.place]
 
     @property
     def column(self) -> list[arb]:
-        return [self._combined(*self.variable.column)]
+        return self._combined(*self.variable.column)
 
     def density(self, v: Balls) -> Balls:
         """dH by dphase, of either sign."""
-        return (v - self.place) * self.variable.density(v)
+        slope: Balls = (v - self.place) * self.variable.density(v)
+        return slope
 
     def integrals(self, phase: arb) -> list[arb]:
-        return [self._combined(*self.variable.integrals(phase))]
+        return self._combined(*self.variable.integrals(phase))
 
-    def estimates(self, phase: float) -> NDArray[np.float64]:
-        first, second = self.variable.estimates(phase)
-        return np.array([second - float(self.place) * first])
+
+Moving: TypeAlias = Gap | Approach | RestingVariable
+"""A variable of an :class:`Inversion`.
+
+turn: its phase grows by this and its integrals by ``column`` with every turn; for a variable that never returns,
+what its integrals grow by with every unit of the phase, at last.  periodic: which of both.
+position: v at a phase.  density: dF_0 by dphase at v, > 0.  integrals: F_j at a phase.
+"""
+Variable: TypeAlias = Gap | Approach | Rest
+"""A separated variable.  middle: of its gap.  phase: that where it is v and dv/dphase is ``slope``.
+
+ends: √(v − lo) and √(hi − v), each with a sign that makes it analytic; bend: −dv/dphase over their product.
+"""
 
 
 # What Kovalevskaya's and Goryachev-Chaplygin's tops share: their tops, and two separated variables on a straight line.
@@ -353,16 +303,16 @@ class Line:
         cls, variables: tuple[Variable, ...], signs: tuple[int, int], slopes: tuple[int, int], phases: Sequence[arb]
     ) -> Line:
         """From the phases at t = 0; signs: ε, slopes: of G_0 and G_1."""
-        moving = tuple(k for k in (0, 1) if not isinstance(variables[k], Rest))
-        inversion, rates = Inversion(variables, signs), tuple(map(arb, slopes))
-        for k in (0, 1):
-            if k not in moving:
-                # of ε_o (G_1 − e G_0), one number
-                middle, other = variables[k].middle, 1 - k
-                inversion = Inversion((RestingVariable(variables[other], middle),), (1,))
-                rates = (signs[other] * (slopes[1] - middle * slopes[0]),)
+        moving = {k: variable for k, variable in enumerate(variables) if not isinstance(variable, Rest)}
+        inversion, rates = Inversion(tuple(moving.values()), signs), tuple(map(arb, slopes))
+        if len(moving) == 1:
+            # of ε (G_1 − e G_0), one number
+            ((k, variable),) = moving.items()
+            double_root = variables[1 - k].middle
+            inversion = Inversion((RestingVariable(variable, double_root),), (1,))
+            rates = (signs[k] * (slopes[1] - double_root * slopes[0]),)
         origin = inversion.values([phases[k] for k in moving])
-        return cls(variables, moving, inversion, tuple(origin), rates)
+        return cls(variables, tuple(moving), inversion, tuple(origin), rates)
 
     def phases(self, time: arb) -> tuple[list[arb], list[int]]:
         """The phases in the first turns, 0 for a variable at rest, and whole turns.
@@ -384,11 +334,11 @@ class Line:
 
     def series(self, phases: Sequence[arb], rates: Callable[[Any, Any], Sequence[Any]]) -> list[Any]:
         """The phases as power series in t, from their differential equations: rates of both at (v1, v2)."""
-        moving = [arb_series([phase], prec=current_length()) for phase in phases]
-        for _ in range(current_length() - 1):
-            v1, v2 = (variable.position(x) for variable, x in zip(self.variables, moving, strict=True))
-            moving = [phase + rate.integral() for phase, rate in zip(phases, rates(v1, v2), strict=True)]
-        return moving
+
+        def slopes(moving: Sequence[Any]) -> Sequence[Any]:
+            return rates(*(variable.position(x) for variable, x in zip(self.variables, moving, strict=True)))
+
+        return solved(phases, slopes)
 
 
 # The integral of a function on a torus along a straight line: Fourier series of two frequencies with a proven error.

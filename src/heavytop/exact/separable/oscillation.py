@@ -27,12 +27,10 @@ from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import atan, ceil, isfinite, isqrt, log, pi, tanh
+from math import ceil, isfinite, isqrt, log, pi
 from typing import Any
 
-import numpy as np
 from flint import acb, arb, arb_mat, arb_poly, fmpq
-from numpy.typing import NDArray
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.closed_form import Evaluated, cached_per_precision, constant, tanh_sech
@@ -95,10 +93,29 @@ class Roots:
 
 
 class SineSums:
-    """Σ_n a_n sin nθ, n ≥ 1, for several rows of coefficients at once: few as polynomials in e^iθ."""
+    """Σ_n a_n sin nθ, n ≥ 1, for several rows of coefficients at once, of which each precision takes those it sees."""
 
     def __init__(self, rows: Sequence[Sequence[arb]]) -> None:
-        length = len(rows[0]) + 1
+        self.rows = rows
+        self.sizes = [max(abs(a).upper() for a in column) for column in zip(*rows, strict=True)]
+        self._seen: dict[int, _SeenSums] = {}
+
+    def at(self, angle: arb) -> list[arb]:
+        """Each sum at the angle, at the working precision."""
+        bits = current_precision()
+        if bits not in self._seen:
+            least = max(self.sizes) * arb(2) ** (-bits - 8)
+            count = max((n for n, size in enumerate(self.sizes, 1) if not size < least), default=1)
+            tails = [arb(0, sum((abs(a).upper() for a in row[count:]), arb(0)).upper()) for row in self.rows]
+            self._seen[bits] = _SeenSums([[+a for a in row[:count]] for row in self.rows], tails)
+        return self._seen[bits].at(angle)
+
+
+class _SeenSums:
+    """Sums of the terms that one precision sees, few of them as polynomials in e^iθ; tails: balls with the others."""
+
+    def __init__(self, rows: Sequence[Sequence[arb]], tails: Sequence[arb]) -> None:
+        length, self.tails = len(rows[0]) + 1, tails
         self.polynomials = [arb_poly([0, *row]) for row in rows] if length <= _FEW_TERMS else []
         if self.polynomials:
             return
@@ -113,12 +130,14 @@ class SineSums:
         if self.polynomials:
             sine, cosine = angle.sin_cos()
             point = acb(cosine, sine)
-            return [polynomial(point).imag for polynomial in self.polynomials]
+            pairs = zip(self.polynomials, self.tails, strict=True)
+            return [polynomial(point).imag + tail for polynomial, tail in pairs]
         steps = [(angle * j).sin_cos() for j in range(self.small)]
         inner = self.matrix * arb_mat([[cosine, sine] for sine, cosine in steps])
         leaps = [(angle * (i * self.small)).sin_cos() for i in range(self.large)]
         rows = arb_mat(inner.nrows() // self.large, 2 * self.large, inner.entries())
-        return (rows * arb_mat(2 * self.large, 1, [part for pair in leaps for part in pair])).entries()
+        sums = (rows * arb_mat(2 * self.large, 1, [part for pair in leaps for part in pair])).entries()
+        return [value + tail for value, tail in zip(sums, self.tails, strict=True)]
 
 
 class Gap:
@@ -141,11 +160,6 @@ class Gap:
         self.errors = [bound.sum_error(self.terms, j) for j in range(count)]
         sines = [[2 * c / n for n, c in enumerate(row[1:], 1)] for row in rows]
         self.sums = SineSums(sines)
-        self._floats = significant(np.array([[float(a) for a in row] for row in sines]))
-        self._mean_floats = np.array([float(mean) for mean in self.means])
-        self._orders = np.arange(1, self._floats.shape[1] + 1)
-        means, sines_held = self._mean_floats, np.isfinite(self._floats).all()
-        self._in_floats = bool(sines_held and np.isfinite(means).all() and means.any())
 
     @property
     def column(self) -> list[arb]:
@@ -175,19 +189,6 @@ class Gap:
     def integrals(self, phase: arb) -> list[arb]:
         sums = self.sums.at(phase)
         return [c * phase + total + e for c, total, e in zip(self.means, sums, self.errors, strict=True)]
-
-    def estimates(self, phase: float) -> NDArray[np.float64]:
-        """See :class:`heavytop.exact.separable.abel.Variable`; raises OutOfReach where floats do not hold the
-        coefficients.
-        """
-        if not self._in_floats:
-            raise OutOfReach(
-                "The period of a separated variable is beyond the range of binary64: moments, weight and rates "
-                "differ by too many decades.",
-                "Choose numbers of less different size.",
-            )
-        values: NDArray[np.float64] = self._mean_floats * phase + self._floats @ np.sin(self._orders * phase)
-        return values
 
 
 class FourierBound:
@@ -295,15 +296,6 @@ def _cosine_sums(values: list[acb], cosines: list[arb]) -> list[acb]:
     return sums[:half]
 
 
-def significant(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The rows without the terms that no float sees; as they are where floats do not hold them."""
-    if not np.isfinite(rows).all():
-        return rows
-    sizes = np.abs(rows) / np.abs(rows).max(axis=1, keepdims=True).clip(min=np.finfo(float).tiny)
-    visible = np.flatnonzero(sizes.max(axis=0) > np.finfo(float).eps / 64)
-    return rows[:, : visible[-1] + 1] if visible.size else rows[:, :1]
-
-
 # A variable that leaves and approaches a double root of a polynomial, and its Abel integrals with a proven error.
 #
 # Between a simple root o and a double root e of f = |v − o| (v − e)² g, L = e − o,
@@ -348,9 +340,6 @@ class Approach:
         sines = [_sines(row) for row in self._rows(count)]
         self.errors = [bound.mean_error(self.terms, j) + bound.sum_error(self.terms, j) for j in range(count)]
         self.sums = SineSums(sines)
-        self._floats = significant(np.array([[float(a) for a in row] for row in sines]))
-        self._orders = np.arange(1, self._floats.shape[1] + 1)
-        self._rate_floats = np.array([float(rate) for rate in rates])
 
     def _rows(self, count: int) -> list[list[arb]]:
         """Fourier coefficients of q_j, as means of q_j cos 2nχ."""
@@ -391,11 +380,6 @@ class Approach:
     def integrals(self, phase: arb) -> list[arb]:
         sums = self.sums.at(2 * (phase / 2).tanh().atan())
         return [c * phase + total + e for c, total, e in zip(self.column, sums, self.errors, strict=True)]
-
-    def estimates(self, phase: float) -> NDArray[np.float64]:
-        angle = 2 * atan(tanh(phase / 2))
-        values: NDArray[np.float64] = self._rate_floats * phase + self._floats @ np.sin(self._orders * angle)
-        return values
 
 
 def _sines(means: list[arb]) -> list[arb]:

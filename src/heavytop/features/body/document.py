@@ -129,7 +129,7 @@ class BodyAssessment:
             yield f"{label:<20}{', '.join(decimal_text(value, _PRINTED) for value in direction)}"
         if self.realisable:
             for axis, rotation in enumerate(self.rotations):
-                rate = f", rate {rotation.rate:.4g} of the angular velocity" if rotation.rate else ""
+                rate = f", rate {rotation.rate:.4g} of the angular velocity" if rotation.rate else rotation.why
                 label = "" if axis else "free rotation"
                 yield from _labelled(label, f"about axis {axis + 1}: {rotation.verdict}{rate}")
             as_given = () if self.sound else ("", "With the numbers of the file, not corrected:")

@@ -95,9 +95,9 @@ class ClaimLibrary(Tabular, Sequence[Entry]):
 
     def _table(self) -> TitledTable:
         counts = [sum(verdict.verdict == name for verdict in self.verdicts.values()) for name in _VERDICTS]
-        said = ", ".join(f"{count} {_SAID[name]}" for name, count in zip(_VERDICTS, counts, strict=True) if count)
+        counted = ", ".join(f"{count} {_SAID[name]}" for name, count in zip(_VERDICTS, counts, strict=True) if count)
         rows = [(entry.id, str(entry.source.year), self.verdicts[entry.id].verdict) for entry in self.entries]
-        return TitledTable(f"{len(self.entries)} claims: {said}", ("claim", "year", "verdict"), rows)
+        return TitledTable(f"{len(self.entries)} claims: {counted}", ("claim", "year", "verdict"), rows)
 
 
 _OPEN = "undecided"

@@ -50,8 +50,10 @@ def unexpected_text(listing: ClaimLibrary) -> RenderableType:
     lines = [Text(total)]
     for entry in off:
         judged = listing.verdicts[entry.id]
-        said = f"{entry.id}: {judged.verdict}, expected: {entry.expects}" + f"; {judged.reason}" * bool(judged.reason)
-        lines.append(Text(fill(said, _WIDTH, subsequent_indent="  "), style=_STYLES[judged.verdict]))
+        difference = f"{entry.id}: {judged.verdict}, expected: {entry.expects}" + f"; {judged.reason}" * bool(
+            judged.reason
+        )
+        lines.append(Text(fill(difference, _WIDTH, subsequent_indent="  "), style=_STYLES[judged.verdict]))
     seconds = sum(judged.seconds for judged in listing.verdicts.values())
     return Group(*lines, Text(f"{seconds:.0f} s of audits."))
 
@@ -106,7 +108,7 @@ _PROVEN = {
 }
 _SYMBOLS = """\
 M = I*Omega (+ k of a rotor), r = (a, b, c): centre of mass; residual: left side
-minus right, of (1.1) in Omega', divided by I; omega, gamma there: as claimed.
+minus right, of (1.1) solved for Omega', with the claimed omega and gamma.
 Equations, and alpha and k of the paper: `heavytop docs claim`."""
 _RESIDUAL = 20
 """Characters of a line of a residual: what a terminal of 80 columns leaves to it."""

@@ -54,14 +54,14 @@ class DerivativeScore(Tabular):
     passed: bool | None
 
     def _table(self) -> TitledTable:
-        kept = "no Jacobian to score"
+        summary = "no Jacobian to score"
         if self.digits_right is not None:
-            kept = f"{digits_text(self.digits_right)} of {self.of_digits} digits right"
+            summary = f"{digits_text(self.digits_right)} of {self.of_digits} digits right"
         rows = [
             [time, digits_text(digits), name, f"{error:.2g}"]
             for time, digits, name, error in zip(self.times, self.digits, self.worst, self.errors, strict=True)
         ]
-        title = f"derivatives: {self.outcome}, {kept}"
+        title = f"derivatives: {self.outcome}, {summary}"
         return TitledTable(
             title, ("t", "digits", "worst", "error"), rows, [f"compared with {self.against}", *self.diagnosis]
         )
@@ -190,9 +190,11 @@ def _diagnoses(matrix: Matrix, true: Matrix, radii: Matrix, start: State) -> lis
     size, gamma = range(6), (Fraction(0), Fraction(0), Fraction(0), *start.gamma)
     flat = [[int(i == j) - gamma[i] * gamma[j] for j in size] for i in size]
     projected = [[sum((true[i][k] * flat[k][j] for k in size), Fraction(0)) for j in size] for i in size]
-    said = {
+    conventions = {
         "It is transposed: row i, column j is ∂y_i(t)/∂y_j(0).": [list(column) for column in zip(*true, strict=True)],
         "gamma0 was held on the unit sphere: here it counts as three independent variables.": projected,
     }
     own = _digits(_worst(matrix, true, radii)[0], 10**6)
-    return [text for text, other in said.items() if _digits(_worst(matrix, other, radii)[0], 10**6) > own + _EXPLAINS]
+    return [
+        text for text, other in conventions.items() if _digits(_worst(matrix, other, radii)[0], 10**6) > own + _EXPLAINS
+    ]

@@ -155,7 +155,7 @@ def _known_events(
 ) -> ReferenceEvents:
     """Proven events of a motion that was checked."""
     if digits not in DIGITS:
-        raise InputError(f"digits must be from 1 to 20000; got {quoted(digits)}.", "Give such as 50.")
+        raise InputError(f"digits must be from 1 to 20000; got {quoted(digits)}.", "Give, for example, 50.")
     if not function.rational:
         raise InputError(
             f"For a proof the function must be rational in Ω and γ; got {quoted(function.name)}.",

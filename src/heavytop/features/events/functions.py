@@ -346,8 +346,8 @@ def start_series(
     with series_length(_DERIVATIVES):
         series = [fmpq_series(row, prec=_DERIVATIVES) for row in y]
         zero = fmpq_series([0], prec=_DERIVATIVES)
-        whole = [composed(terms_of(polynomial), series, zero) for polynomial in polynomials]
-        coefficients = [[coefficient(series, n) for n in range(_DERIVATIVES)] for series in whole]
+        along_motion = [composed(terms_of(polynomial), series, zero) for polynomial in polynomials]
+        coefficients = [[coefficient(series, n) for n in range(_DERIVATIVES)] for series in along_motion]
     return [[Fraction(int(c.p), int(c.q)) for c in row] for row in coefficients]
 
 

@@ -43,7 +43,7 @@ from heavytop.precision import decimal_text
 _GUARD_BITS = 24
 _ATTEMPTS = 3
 _MOST_PARTS = 4096
-"""Of a step.  A simple zero takes some twenty; where a function is as small as its error, chance decides each."""
+"""Most of a step.  A simple zero takes some twenty; where a function is as small as its error, chance decides each."""
 _REFINEMENTS = 200
 _MOST_ORDER = 8
 """Derivatives that may vanish at t = 0 beside a function that does."""
@@ -143,12 +143,12 @@ class _Near(NamedTuple):
 
 def _without_tail(what: Any) -> Any:
     """A polynomial at 0 ≤ x ≤ 1 whose constant coefficient holds all later ones that add a thousandth to its radius."""
-    kept = what.coeffs() or [arb(0)]
-    allowed, rest = kept[0].rad() / 1024, arb(0)
-    while len(kept) > 1 and (more := (rest + abs(kept[-1])).upper()) <= allowed:
+    coefficients = what.coeffs() or [arb(0)]
+    allowed, rest = coefficients[0].rad() / 1024, arb(0)
+    while len(coefficients) > 1 and (more := (rest + abs(coefficients[-1])).upper()) <= allowed:
         rest = more
-        kept.pop()
-    return arb_poly([kept[0] + arb(0, rest), *kept[1:]])
+        coefficients.pop()
+    return arb_poly([coefficients[0] + arb(0, rest), *coefficients[1:]])
 
 
 def _range(what: Any, middle: Fraction, half: Fraction) -> Any:
@@ -165,9 +165,9 @@ def _shortened(what: Any) -> Any:
     """A polynomial whose constant coefficient is a ball that holds all beyond an order, for 0 ≤ s ≤ 1."""
     coefficients = what.coeffs()
     rest = sum((abs(c).upper() for c in coefficients[_SHORT_ORDER + 1 :]), arb(0)).upper()
-    kept = coefficients[: _SHORT_ORDER + 1] or [arb(0)]
-    kept[0] = kept[0] + arb(0, rest)
-    return arb_poly(kept)
+    leading = coefficients[: _SHORT_ORDER + 1] or [arb(0)]
+    leading[0] = leading[0] + arb(0, rest)
+    return arb_poly(leading)
 
 
 def _sign(value: Any) -> int:
@@ -249,7 +249,7 @@ class _Search:
     axes: Any = None
     motion: Any = None
     terms: Any = None
-    kept: list[_Piece] = field(default_factory=list)
+    pieces_since: list[_Piece] = field(default_factory=list)
 
     def run(self, bits: int) -> list[ProvenEvent]:
         """The events; raises _Undecided where ``bits`` bits are too few."""
@@ -292,13 +292,13 @@ class _Search:
     def _zeros(self, pieces: Iterator[_Piece], after: int) -> Iterator[tuple[Fraction, Fraction]]:
         """Scaled times between which there is exactly one zero, simple or proven by its derivatives.
 
-        ``kept`` holds the steps from the last time at which the sign is proven.
+        ``pieces_since`` holds the steps from the last time at which the sign is proven.
         """
         anchor, sign, slope = Fraction(0), after, 0
         last = Fraction(0)
         fresh = self.order > 0
         for piece in pieces:
-            self.kept.append(piece)
+            self.pieces_since.append(piece)
             for cell in self._cells(piece, fresh):
                 if fresh:
                     # up to here the first derivative that does not vanish at t = 0 has one sign
@@ -318,7 +318,7 @@ class _Search:
                             yield anchor, cell.high
                         anchor, sign, slope = cell.high, cell.at_high, 0
                 last = cell.high
-            self.kept = [piece for piece in self.kept if piece.began + piece.length >= anchor]
+            self.pieces_since = [piece for piece in self.pieces_since if piece.began + piece.length >= anchor]
         if slope:
             raise _Undecided(self._time(last), "whether the function changes sign before the end of the run")
 
@@ -330,7 +330,7 @@ class _Search:
 
     def _event(self, low: Fraction, high: Fraction, before: int) -> ProvenEvent:
         """The zero between two scaled times, refined; ``before``: the sign of the numerator before it."""
-        pieces = [piece for piece in self.kept if piece.began <= high and piece.began + piece.length >= low]
+        pieces = [piece for piece in self.pieces_since if piece.began <= high and piece.began + piece.length >= low]
         refined = _refined(pieces, low, high, -before, self.digits, self.motion, self.until > 0, self.axes)
         if refined is None:
             raise _Undecided(self._time(high), "to so many digits where the function changes sign")

@@ -148,7 +148,7 @@ class Homoclinic(Kind):
         shown = list(earlier.values())
         title = "Escape from a homoclinic motion at |t|"
         yield from in_columns(title, lambda row: short(row.metrics[ESCAPE.text].value), shown)
-        yield from (Note(said, shown=In.SHORT) for said in _hidden(shown))
+        yield from (Note(sentence, shown=In.SHORT) for sentence in _hidden(shown))
         yield Cells(
             "Integrators on a homoclinic motion, against its closed form",
             ["case", "format", "Ω error", "γ error", "drift", "escape |t|", "outcome"],
@@ -168,9 +168,9 @@ def _headline(known: Sequence[Row]) -> Headline:
     theirs = [row for row in known if row.key.subject.name != HEYOKA]
     name, cases = (theirs or known)[0].key.subject.name, dict.fromkeys(row.key.case for row in theirs or known)
     on = "a homoclinic motion" if len(cases) > 1 else clip(next(iter(cases)), 40)
-    said = f"{clip(name, 40)} stays on {on} up to |t| = {_stays(row for row in known if _by(row, name))}"
+    sentence = f"{clip(name, 40)} stays on {on} up to |t| = {_stays(row for row in known if _by(row, name))}"
     ours = [row for row in known if theirs and _by(row, HEYOKA) and row.key.case in cases]
-    return Headline(f"{said}{f'; {HEYOKA} to {_stays(ours)}' if ours else ''}.")
+    return Headline(f"{sentence}{f'; {HEYOKA} to {_stays(ours)}' if ours else ''}.")
 
 
 def _cells(row: Row) -> list[Cell]:

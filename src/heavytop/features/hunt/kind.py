@@ -18,7 +18,7 @@ from heavytop.kind import Kind
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact, exact_text, parse, physical, time_text
 from heavytop.records import HEYOKA, Against, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
-from heavytop.report.document.document import Block, Card, In, Note, short
+from heavytop.report.document.document import Block, Card, Headline, In, Note, short
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
 
 NAME = "hunt"
@@ -95,7 +95,9 @@ class HuntKind(Kind):
         )
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
-        """A line a row."""
+        """The search that came nearest to a finding; a line a row."""
+        if rows:
+            yield Headline(f"{_line(max(rows, key=lambda row: exact(row.metrics[WORST.text].value)))}.")
         lines = [Note(_line(row)) for row in rows]
         yield Card("Searches for the motion that breaks an integrator", lines, shown=In.SHORT | In.FULL | In.PAGE)
 
@@ -141,5 +143,5 @@ def _measured(hunted: Hunted) -> str:
 
 def _line(row: Row) -> str:
     worst = short(row.metrics[WORST.text].value)
-    about = f"the worst error is {worst} times what law and amplification explain"
+    about = f"the worst error is {worst} times what the integrator's law and the motion's amplification explain"
     return f"{row.case} {row.integrator} {row.precision}: nothing found; {about}"

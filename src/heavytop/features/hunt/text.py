@@ -50,7 +50,7 @@ def worst_lines(hunted: Hunted) -> list[str]:
 def _searched(hunted: Hunted) -> str:
     a = hunted.asked
     beyond = "" if not hunted.unknown else f" The true motion of {hunted.unknown} was out of reach."
-    lost = "" if not hunted.lost else f" {hunted.lost} keep no digit in any integrator of this format."
+    lost = "" if not hunted.lost else f" On {hunted.lost} no integrator of this format keeps a digit."
     return fill(
         f"{a.integrator.name} in {a.precision.name} to T = {time_text(a.horizon)}: {hunted.motions} motions tried of "
         f"{hunted.planned}.{beyond}{lost}",

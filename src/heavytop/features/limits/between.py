@@ -92,9 +92,9 @@ def between_samples(
     about, end, step = arguments.system(system, body), physical(until, "until"), physical(spacing, "between")
     wanted = None if within is None else float(physical(within, "within"))
     if not 0 < step <= end:
-        raise InputError(f"spacing must be above 0 and at most until; got {spacing}.", "Give such as until/100.")
+        raise InputError(f"spacing must be above 0 and at most until; got {spacing}.", "Give, for example, until/100.")
     if wanted is not None and not 1e-12 < wanted < 1:
-        raise InputError(f"within must be between 1e-12 and 1; got {within}.", "Give such as 1e-6.")
+        raise InputError(f"within must be between 1e-12 and 1; got {within}.", "Give, for example, 1e-6.")
     count = int(-(-end // step))
     if count > _MOST:
         raise InputError(f"{count} intervals are more than {_MOST}.", "Give a larger spacing, or an earlier time.")

@@ -58,14 +58,14 @@ class LimitOptions(NamedTuple):
 class MotionLimits:
     """Measurements, by the keys of the document."""
 
-    found: dict[str, Any]
+    measured: dict[str, Any]
 
     def to_json(self) -> dict[str, Any]:
         """Entries of the document of the motion."""
-        return {name: value.to_json() for name, value in self.found.items()}
+        return {name: value.to_json() for name, value in self.measured.items()}
 
     def text(self) -> RenderableType:
         """A table for each."""
         from rich.text import Text
 
-        return Text("\n" + "\n\n".join(str(value) for value in self.found.values()))
+        return Text("\n" + "\n\n".join(str(value) for value in self.measured.values()))

@@ -131,7 +131,9 @@ def power(
     apart = end / 100 if step is None else physical(step, "step")
     if not (0 < apart <= end and most > 0):
         asked = f"until = {until}, step = {apart}, tolerance = {tolerance}"
-        raise InputError(f"{asked}: these must be positive, and step at most until.", "Give such as 10, 0.1, 1e-6.")
+        raise InputError(
+            f"{asked}: these must be positive, and step at most until.", "Give, for example, 10, 0.1, 1e-6."
+        )
     count = int(end // apart)
     if count > _MOST:
         raise InputError(f"{count} samples are more than {_MOST}.", "Give a larger step, or an earlier end.")

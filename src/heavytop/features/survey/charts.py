@@ -46,9 +46,9 @@ def survey_charts(sources: Sources, first: Iterable[str] = ()) -> Section | None
         "surveys",
         "Surveys of many motions",
         [
-            "A distribution is the part of the motions in each quarter of a decade. In the map a stronger colour "
-            "means fewer digits right (the median). Each of the worst motions is drawn as the path of the "
-            f"vertical γ on the unit sphere in body axes, seen from (1, 1, 1), up to t = {drawn}; dashed behind.",
+            "A distribution is the fraction of the motions in each quarter of a decade. In the map a stronger colour "
+            "means fewer digits right (the median), white no motion. Each of the worst motions is drawn as the path of "
+            f"the vertical γ on the unit sphere in body axes, seen from (1, 1, 1), up to t = {drawn}; dashed behind.",
         ],
         columns=["sweep", "motion", "outcome", "error", "digits right", "inertia", "P", "r", "Ω", "γ", "command"],
         across=2,
@@ -87,7 +87,7 @@ def _label(source: str, row: Row) -> str:
 
 
 def _distribution(section: Section, rows: Sequence[tuple[str, Row]], keys: Keys, name: str) -> Picture:
-    axes = new_axes(_NAMES[name], "part of the motions")
+    axes = new_axes(_NAMES[name], "fraction of the motions")
     decades(axes.xaxis)
     alternative = []
     for source, row in rows:
@@ -113,7 +113,7 @@ def _map(cells: CellMap, label: str, digits: float, name: str) -> Picture:
     low, high = min(known), max(known)
 
     def paint(x: float, y: float, width: float, height: float, lost: float, **options: Any) -> None:
-        dark = 0.08 + 0.92 * (lost - low) / (high - low or 1.0)
+        dark = 0.2 + 0.8 * (lost - low) / (high - low or 1.0)
         patch = Rectangle((x, y), width, height, linewidth=0, facecolor=COLOURS[0], **options)
         patch.set_alpha(round(dark, 2))
         axes.add_patch(patch)
@@ -130,8 +130,8 @@ def _map(cells: CellMap, label: str, digits: float, name: str) -> Picture:
         paint(0.3 + 0.4 * step / _SHADES, 1.005, 0.4 / _SHADES, 0.03, lost, transform=axes.transAxes, clip_on=False)
     for position, lost, side in ((0.28, high, "right"), (0.72, low, "left")):
         axes.text(position, 1.005, f"{digits - lost:.1f}", transform=axes.transAxes, ha=side, size=7)
-    said = f"From {digits - high:.1f} digits right, the strongest colour, to {digits - low:.1f}, the faintest."
-    return finish(axes, f"Digits right over {x} and {y}: {label}", said, name, said)
+    caption = f"From {digits - high:.1f} digits right, the strongest colour, to {digits - low:.1f}, the faintest."
+    return finish(axes, f"Digits right over {x} and {y}: {label}", caption, name, caption)
 
 
 def _paths(row: Row, worst: Sequence[Worst], label: str, name: str) -> Picture:
@@ -155,8 +155,8 @@ def _paths(row: Row, worst: Sequence[Worst], label: str, name: str) -> Picture:
     axes.set_ylim(-2.9 * ((len(worst) - 1) // _IN_A_ROW) - 1.8, 1.2)
     axes.set_aspect("equal")
     axes.set_axis_off()
-    said = "The worst first, by their index in the sweep; a dot is where γ begins."
-    return finish(axes, f"The worst {len(worst)} motions: {label}", said, name, said)
+    caption = "The worst first, by their index in the sweep; a dot is where γ begins."
+    return finish(axes, f"The worst {len(worst)} motions: {label}", caption, name, caption)
 
 
 def _gamma(row: Row, motion: Worst) -> Any:

@@ -186,7 +186,7 @@ class Gathered:
         self._map: dict[str, list[Any]] = {name: [] for name in task.options}
 
     def take(self, row: Row) -> None:
-        """One chunk."""
+        """Add a chunk."""
         assert isinstance(row.chunk, bytes)
         table = read_chunk(row.chunk)
         for name, values in self._values.items():
@@ -283,7 +283,7 @@ def command(key: RowKey, times: Sequence[Fraction], case: Case, reached: bool) -
 
 
 def gathered(rows: Iterator[tuple[Task, Row]]) -> list[Row]:
-    """One row for each sweep and integrator, in the order of the plan.
+    """A row for each sweep and integrator, in the order of the plan.
 
     A survey with a chunk that was not measured ends as the first such chunk does: what the others came to stays in it.
     """

@@ -98,8 +98,8 @@ def _motion(row: Row, before: dict[str, Any], after: dict[str, Any], at: int) ->
     digits = [round(float(columns["digits_right"][at]), 2) for columns in (before, after)]
     known = [None if math.isnan(value) else value for value in digits]
     worst = row.worst if isinstance(row.worst, tuple) else ()
-    said = next((motion.command for motion in worst if motion.index == index), "")
-    return WorseMotion(index, known[0], known[1], outcome, said or _command(row, after, at, outcome))
+    listed = next((motion.command for motion in worst if motion.index == index), "")
+    return WorseMotion(index, known[0], known[1], outcome, listed or _command(row, after, at, outcome))
 
 
 def _command(row: Row, columns: dict[str, Any], index: int, outcome: str) -> str:

@@ -51,7 +51,7 @@ class SurveyTable(PlanTable, tag=NAME):
         return Lazy(number_of(cases), partial(chunks, sweep, cases))
 
     def tasks(self, find: Find) -> list[Task]:
-        """One for each sweep, of its first motion; a plan makes one of each chunk from it."""
+        """A task for each sweep, of its first motion; a plan makes one of each chunk from it."""
         for name in self.cases:
             if not name.startswith(_SWEEP):
                 raise InputError(f"A survey must name a sweep; got {quoted(name)}.", "Name sweeps: sweep:NAME.")
@@ -112,7 +112,7 @@ class Survey(Kind):
         return worse_motions(old, new, (folders[0] / FILE, folders[1] / FILE), limits(METRIC))
 
     def gather(self, rows: Callable[[], Iterator[tuple[Task, Row]]], folder: Path) -> list[Row]:
-        """One row for each sweep and integrator; the records of all motions go into survey.parquet."""
+        """A row for each sweep and integrator; the records of all motions go into survey.parquet."""
         write(folder / FILE, contents(row for _, row in rows()))
         return gathered(rows())
 
@@ -161,11 +161,11 @@ def _headline(rows: Sequence[Row]) -> Iterator[Headline]:
         return
     worst, row = max(errors, key=lambda pair: -math.inf if pair[0].log10 is None else pair[0].log10)
     count = sum(int(number) for _, number in of_motions(row))
-    said = f"{count:,} tops{f' of {row.case}' if len(rows) > 1 else ''}: "
+    sentence = f"{count:,} tops{f' of {row.case}' if len(rows) > 1 else ''}: "
     if (median := row.metric("solution_error", "relative", "median")) is not None:
-        said += f"median error {short(median.value, 2)}, "
+        sentence += f"median error {short(median.value, 2)}, "
     which = f" (top {row.worst[0].index})" if isinstance(row.worst, tuple) and row.worst else ""
-    yield Headline(f"{said}worst {short(worst.value, 2)}{which}.")
+    yield Headline(f"{sentence}worst {short(worst.value, 2)}{which}.")
 
 
 def _line(row: Row) -> str:
@@ -173,10 +173,10 @@ def _line(row: Row) -> str:
     if row.outcome != Outcome.SUCCESS.value:
         return f"{row.case} {row.integrator} {row.precision}: {row.outcome}"
     metrics = {part: row.metric("solution_error", "relative", part) for part in ("median", "q99", "max")}
-    said = ", ".join(
+    errors = ", ".join(
         f"{name.replace('q99', '99 % below')} {float(metric):.2g}"
         for name, metric in metrics.items()
         if metric is not None
     )
     worst = f"; the worst is {row.worst[0].case}" if isinstance(row.worst, tuple) and row.worst else ""
-    return f"{row.case} {row.integrator} {row.precision} to T = {row.horizon}: {counts}; error: {said}{worst}"
+    return f"{row.case} {row.integrator} {row.precision} to T = {row.horizon}: {counts}; error: {errors}{worst}"

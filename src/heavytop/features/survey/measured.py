@@ -22,11 +22,12 @@ from heavytop.errors import Contradiction, PeerFailed
 from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.harness.sweeps import Lazy, Random, Sweep
 from heavytop.integrate.heyoka.lanes import states_on_a_grid
-from heavytop.integrate.multiword.lanes import Pairs, double_double_states, propagate_multiword_ensemble
+from heavytop.integrate.multiword.lanes import double_double_states, propagate_multiword_ensemble
 from heavytop.integrate.registry import Integrator, described
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.rounding_noise import factor, scaled
 from heavytop.measure.truth import Known, known_motion
+from heavytop.multiword.pairs import Pairs
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, exact, number
 from heavytop.records import HEYOKA
 from heavytop.top.equations import HEAVY_TOP, Integral, Parameters, System, holding
@@ -133,11 +134,7 @@ def drawn(chunk: Chunk, precision: Precision, seed: int = 0) -> Drawn:
 def _drawn_pairs(problems: Sequence[Problem]) -> Pairs:
     """Their numbers, which two doubles hold: of formats of 106 bits at most."""
     rows = [[*problem.system.entering(problem.parameters), *problem.start.flat] for problem in problems]
-    high = numpy.array(rows, float)
-    low = [
-        [float(v - Fraction(h)) for v, h in zip(*pair, strict=True)] for pair in zip(rows, high.tolist(), strict=True)
-    ]
-    return Pairs(high, numpy.array(low))
+    return Pairs.nearest(rows)
 
 
 def _integrals(case: Case) -> tuple[Integral, ...]:
@@ -178,7 +175,7 @@ _ALWAYS = holding(HeavyTop((4, 5, 6), 1, (1, 1, 1)), State((1, 0, 0), (0, 0, 1))
 DRIFTS = ("gamma_squared", "area", "energy", "further")
 """Integrals whose drift is a column; further: the largest drift of all others that the motion has."""
 _TOLERANCES = Fraction(1, 2**96), Fraction(1, 2**84)
-"""Of both runs in double; other orders and steps.  In extended: of double-double itself, and the first."""
+"""The tolerances of both runs in double; other orders and steps.  In extended: double-double's own, and the first."""
 _MODERATE = 1e4
 """Larger data, and times, are looked at motion by motion."""
 _STEP_LIMIT = 1_000_000
@@ -290,7 +287,7 @@ def _truth(drawn: Drawn, times: Sequence[Fraction], precision: Precision) -> tup
 
 
 def _reference(drawn: Drawn, times: Sequence[Fraction], precision: Precision, tolerance: Fraction | None) -> Pairs:
-    """One run in double-double, of all motions."""
+    """A run in double-double, of all motions."""
     count = len(drawn.problems)
     states, good = _pairs([()] * count, len(times)), numpy.zeros(count, bool)
     if drawn.system is HEAVY_TOP and tolerance is not None and _usual(drawn, times, precision):

@@ -89,7 +89,7 @@ def work_precision(sources: Sources, first: Iterable[str] = ()) -> Section | Non
     drawn = {source: panels(report.rows) for source, report in sources}
     colours = _in_colour([lines for of_cases in drawn.values() for lines in of_cases.values()])
     if len(colours) > _MOST_COLOURS:
-        section.notes.append("Grey: integrators that are slower at error 1e-10 than those in colour.")
+        section.notes.append("Grey: integrators that are less often among the five fastest at error 1e-10.")
     for number, case in enumerate(cases[:MOST_CASES]):
         lines = [(source, line) for source, of_cases in drawn.items() for line in of_cases.get(case, ())]
         section.pictures.append(_picture(lines, colours, f"{clip(case, 40)}: time against error", f"work-{number}"))

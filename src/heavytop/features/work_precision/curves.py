@@ -136,10 +136,10 @@ class Lead:
         if self.ratio is None:
             return ""
         if self.ratio < 1:
-            return f"At 1e{self.log10:g} {self.other} is {1 / self.ratio:.1f} × as fast as {self.name}"
+            return f"At 1e{self.log10:g} {self.other} is {_times(1 / self.ratio)}as fast as {self.name}"
         other = self.general and self._ratio(self.general[1])
-        more = f" ({self.general[0]} {other:.1f} ×)" if self.general and other else ""
-        return f"At 1e{self.log10:g} {self.name} is {self.ratio:.1f} × as fast as {self.other}{more}"
+        more = f"{self.ratio:.1f} ×, {self.general[0]} {other:.1f} × " if self.general and other else ""
+        return f"At 1e{self.log10:g} {self.name} is {more or _times(self.ratio)}as fast as {self.other}"
 
     @property
     def text(self) -> str:
@@ -222,7 +222,8 @@ def beside_ours(rows: Sequence[Row]) -> list[Table]:
     names = {line.integrator for lines in lines_by_case.values() for line in lines} - {OURS, CONSTANTS, LANES}
     beside = any(line.integrator == OURS for lines in lines_by_case.values() for line in lines)
     tables = []
-    for name in sorted(names if beside and len(names) == 1 else names - INTEGRATORS.keys()):
+    own = names if beside and len(names) == 1 else names - INTEGRATORS.keys()
+    for name in sorted(own):
         of_name = {case: [line for line in lines if line.integrator == name] for case, lines in lines_by_case.items()}
         for case in [case for case, lines in of_name.items() if any(line.points for line in lines)][:_MOST_CASES]:
             cells = []
@@ -233,7 +234,8 @@ def beside_ours(rows: Sequence[Row]) -> list[Table]:
                     if (curve.integrator, curve.precision) == (OURS, line.precision)
                 ]
                 cells += [_point(line, point, ours)[: 3 + beside] for point in line.points]
-                cells += [] if line.order is None else [["order, finest two", line.order_text, "", ""][: 3 + beside]]
+                order = "order, finest two" if len(own) == 1 else f"order of {name}, finest two"
+                cells += [] if line.order is None else [[order, line.order_text, "", ""][: 3 + beside]]
             columns = [f"{name}, {case}", "error", "time", "heyoka's time"][: 3 + beside]
             tables.append(Table("", columns, cells, shown=In.SHORT))
     return tables
@@ -290,6 +292,11 @@ def _quickest(lines: Sequence[WorkPrecisionLine], log10: float) -> tuple[float |
     return min(times, default=(None, ""))
 
 
+def _times(ratio: float) -> str:
+    """``1.3 × ``; "" where that is one."""
+    return "" if f"{ratio:.1f}" == "1.0" else f"{ratio:.1f} × "
+
+
 def _speed(ratio: float) -> str:
     return f"{ratio:.1f} × as fast" if ratio >= 1 else f"{ratio:.2g} × as fast"
 
@@ -315,7 +322,8 @@ def fastest(rows: Sequence[Row]) -> Headline | None:
     where = clip(ratios_of[0][0].case, 40) if len(ratios_of) == 1 else where
     low, high = (f"{ratio:.0f}" if ratio >= 100 else f"{ratio:.1f}" for ratio in (min(ratios), max(ratios)))
     times = low if low == high else f"{low} to {high}"
-    other = clip(behind.pop(), 40) if len(behind) == 1 else "the next"
+    best = "the best other than heyoka" if first.startswith(OURS) else "heyoka"
+    other = clip(behind.pop(), 40) if len(behind) == 1 else best
     text = f"{clip(first, 40)} is the fastest at error 1e-10 on {where}: {times} times as fast as {other}"
     return Headline("; ".join([text, *(f"{clip(name, 40)} on {n}" for name, n in rest)]) + ".")
 

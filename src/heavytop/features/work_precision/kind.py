@@ -40,7 +40,7 @@ from heavytop.precision import DOUBLE, exact, number, parse, physical, time_text
 from heavytop.records import FINEST, Beside, Explained, Metric, Quantity, Row, Subject, by_name
 from heavytop.report.document.document import Block, Chart, In, Note, clip
 from heavytop.report.document.document import Table as Cells
-from heavytop.report.store.checks import CLOSE, bound, ended, size_of, sizes
+from heavytop.report.store.checks import CLOSE, bound, ended, peak, size_of
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import State
 
@@ -217,8 +217,10 @@ class WorkPrecision(Kind):
         largest, last = (row.metrics.get(quantity.text) for quantity in (ERROR_MAX, ERROR_FINAL))
         if len(both) < 2 or largest is None:
             return
-        values = [size for series in both for size in sizes(series)]
-        if values and max(values) > bound(largest) + CLOSE:
+        if (
+            max((size for series in both if (size := peak(series)) is not None), default=-math.inf)
+            > bound(largest) + CLOSE
+        ):
             yield "error_max: smaller than its series"
         if last is None or last.log10 is None:
             return

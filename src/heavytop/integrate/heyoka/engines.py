@@ -220,7 +220,7 @@ class Compiled:
 
 _compiled: dict[tuple[Any, ...], Compiled] = {}
 _compiling: dict[tuple[Any, ...], RLock] = {}
-"""One lock a key: what one thread compiles, another that needs the same waits for."""
+"""A lock for each key: what one thread compiles, another that needs the same waits for."""
 
 
 @cache
@@ -271,7 +271,8 @@ def compiled(
     Raises Contradiction where its first step, which is known, is wrong.
     """
     compact = precision.family in ("quad", "real") if compact_mode is None else compact_mode
-    key = (system.name, precision, attitude, tolerance, high_accuracy, compact, lanes, constants)
+    settings = precision, attitude, tolerance, high_accuracy, compact, lanes, constants
+    key = (system.name, *settings)
     machine = _compiled.get(key)
     if machine is not None:
         return machine
@@ -282,7 +283,7 @@ def compiled(
         raise InputError(f"Constants cannot be compiled in for {precision.name}.", "Use double.")
     with _compiling.setdefault(key, RLock()):
         if key not in _compiled:
-            engine, seconds = _built(system, precision, attitude, tolerance, high_accuracy, compact, lanes, constants)
+            engine, seconds = _built(system, *settings)
             check(engine, system, precision, constants)
             _compiled[key] = Compiled(engine, seconds, _flags(engine))
     return _compiled[key]

@@ -57,6 +57,11 @@ class Work:
     send: Callable[[Any], None] = field(init=False)
     room: Semaphore = field(default_factory=lambda: Semaphore(_ROOM))
 
+    @property
+    def moves(self) -> bool:
+        """Whether any step is asked for."""
+        return bool(self.targets[-1] != 0) and (self.step_limit is None or self.step_limit > 0)
+
     def take(self) -> tuple[int, Problem] | None:
         """A problem that no thread has taken yet."""
         try:
@@ -128,7 +133,7 @@ class LaneRun:
 
 @dataclass(slots=True, eq=False)
 class _Run(LaneRun):
-    """One in a lane, or out of it and waiting for its last samples.  asked: how many samples it has passed."""
+    """A run in a lane, or out of it and waiting for its last samples.  asked: how many samples it has passed."""
 
     parameters: Any
     asked: int = 0
@@ -153,7 +158,7 @@ class _Sample(NamedTuple):
 
 
 class Lanes:
-    """One thread's lanes; each takes the next problem as soon as its own is over.
+    """The lanes of a thread; each takes the next problem as soon as its own is over.
 
     mover and sampler: two copies of the batch engine.
     """

@@ -9,6 +9,7 @@ from fractions import Fraction
 from functools import lru_cache
 from math import ceil, factorial
 from threading import Lock
+from typing import Any
 
 from heavytop.errors import Contradiction, InputError
 from heavytop.integrate.heyoka.engines import GAMMA, OMEGA, XI, derivatives, known_parameters
@@ -31,7 +32,7 @@ _LATER = Fraction(7, 11)
 
 
 def check(system: System, attitude: bool, begin: Callable[[Scaled], Steps], bits: int, bounded: bool = False) -> None:
-    """One step against the exact series of a known motion: coefficients, the new state, and a sample inside the step.
+    """Compare a step with the exact series of a known motion: coefficients, the new state, a sample inside the step.
 
     begin: a run of a problem at its start.  bits: of its arithmetic.  bounded: the units it wants.
     Raises Contradiction.
@@ -71,8 +72,8 @@ def _require(fine: bool, what: str, bits: int) -> None:
 
 LOOSEST = Fraction(1, 10**6)
 _SPARE_BITS, _SPARE_BITS_OF_DOUBLE = 6, 17
-"""Of the formats that double-double exceeds: a long run adds its local errors up, and the sum shall stay below half an
-eps, to T = 1000 in extended and to T = 10,000 in double (measured)."""
+"""Bits beyond those of a format that double-double exceeds: a long run adds its local errors up, and the sum shall stay
+below half an eps, to T = 1000 in extended and to T = 10,000 in double (measured)."""
 _GUARD_BITS = 8
 _FINEST = Fraction(1, 2 ** (double_double_run.BITS - 1))
 """The tolerance of double-double."""
@@ -87,9 +88,17 @@ class Arithmetic(ABC):
     tolerance: Fraction
 
     @property
-    @abstractmethod
     def flags(self) -> dict[str, str]:
         """Everything that can change bits; they are those of every processor."""
+        return self._bits() | {"tolerance": decimal_text(self.tolerance, 6)} | self._steps()
+
+    @abstractmethod
+    def _bits(self) -> dict[str, str]:
+        """The name of this arithmetic, its words and bits."""
+
+    def _steps(self) -> dict[str, str]:
+        """Its order, where that is fixed, and the rule of its steps."""
+        return {"step_rule": "powers of two, by the number of orders"}
 
     @abstractmethod
     def begin(self, scaled: Scaled, forwards: bool) -> ResumableRun:
@@ -114,13 +123,11 @@ class DoubleDouble(Arithmetic):
     schedule: OrderSchedule
     in_lanes: OrderSchedule
 
-    @property
-    def flags(self) -> dict[str, str]:
+    def _bits(self) -> dict[str, str]:
+        return {"arithmetic": "double-double", "words": "2", "bits": str(double_double_run.BITS)}
+
+    def _steps(self) -> dict[str, str]:
         return {
-            "arithmetic": "double-double",
-            "words": "2",
-            "bits": str(double_double_run.BITS),
-            "tolerance": decimal_text(self.tolerance, 6),
             "order": str(self.schedule.order),
             "step_rule": f"radius of convergence times 2^{self.schedule.reach:.3f}, ten bits",
             "plain_orders": f"where rounding is below 2^{self.schedule.room - 53:.1f}",
@@ -157,15 +164,8 @@ class Words(Arithmetic):
     tolerance: Fraction
     grid: Grid
 
-    @property
-    def flags(self) -> dict[str, str]:
-        return {
-            "arithmetic": "fixed grids",
-            "words": str(self.grid.words),
-            "bits": str(self.grid.total),
-            "tolerance": decimal_text(self.tolerance, 6),
-            "step_rule": "powers of two, by the number of orders",
-        }
+    def _bits(self) -> dict[str, str]:
+        return {"arithmetic": "fixed grids", "words": str(self.grid.words), "bits": str(self.grid.total)}
 
     def begin(self, scaled: Scaled, forwards: bool) -> ResumableRun:
         return Fixed(scaled, self.grid, forwards)
@@ -183,14 +183,8 @@ class WholeNumbers(Arithmetic):
     tolerance: Fraction
     bits: int
 
-    @property
-    def flags(self) -> dict[str, str]:
-        return {
-            "arithmetic": "integers",
-            "bits": str(self.bits),
-            "tolerance": decimal_text(self.tolerance, 6),
-            "step_rule": "powers of two, by the number of orders",
-        }
+    def _bits(self) -> dict[str, str]:
+        return {"arithmetic": "integers", "bits": str(self.bits)}
 
     def begin(self, scaled: Scaled, forwards: bool) -> ResumableRun:
         return IntegerMotion(scaled, self.bits, forwards)
@@ -262,32 +256,35 @@ def accuracy(arithmetic: Arithmetic, scaled: Scaled) -> int:
     return int(arithmetic.flags["bits"]) - _GUARD_BITS - fixed_point_run.spread(scaled) - fixed_point_run.excess(scaled)
 
 
-_made: dict[tuple[type, Grid | None, str, bool], float] = {}
+_made: dict[tuple[Any, ...], float] = {}
 _making = Lock()
+
+
+def _once(key: tuple[Any, ...], make: Callable[[], float]) -> float:
+    """The result of ``make`` for this key, called once; other threads that ask wait."""
+    with _making:
+        if key not in _made:
+            _made[key] = make()
+        return _made[key]
 
 
 def compiled(arithmetic: Arithmetic, system: System, attitude: bool) -> float:
     """The seconds that compiling took, once for each arithmetic and system; it is checked then."""
     key = (type(arithmetic), getattr(arithmetic, "grid", None), system.name, attitude)
-    with _making:
-        if key not in _made:
-            _made[key] = arithmetic.make(system, attitude)
-        return _made[key]
+    return _once(key, lambda: arithmetic.make(system, attitude))
 
 
 def compiled_lanes(system: System) -> float:
     """The seconds that compiling the code of eight lanes took; it is checked then as :meth:`Arithmetic.make` does."""
-    key = (eight_lane_run.Eight, None, system.name, False)
-    with _making:
-        if key not in _made:
-            seconds = eight_lane_run.machine(system).seconds
-            check(
-                system,
-                False,
-                lambda scaled: eight_lane_run.OneOfEight(scaled, _ALLOWED, _ALLOWED.order - 1),
-                double_double_run.BITS,
-            )
-            check(system, False, lambda scaled: eight_lane_run.OneOfEight(scaled, _SPLIT_ALLOWED, 30), _SPLIT_BITS)
-            check(system, False, lambda scaled: eight_lane_run.OneOfEight(scaled, _PLAIN, 3), _PLAIN_BITS)
-            _made[key] = seconds
-        return _made[key]
+    return _once((eight_lane_run.Eight, system.name), lambda: _make_lanes(system))
+
+
+def _make_lanes(system: System) -> float:
+    def begin(schedule: OrderSchedule, low_order: int) -> Callable[[Scaled], Steps]:
+        return lambda scaled: eight_lane_run.OneOfEight(scaled, schedule, low_order)
+
+    seconds = eight_lane_run.machine(system).seconds
+    check(system, False, begin(_ALLOWED, _ALLOWED.order - 1), double_double_run.BITS)
+    check(system, False, begin(_SPLIT_ALLOWED, 30), _SPLIT_BITS)
+    check(system, False, begin(_PLAIN, 3), _PLAIN_BITS)
+    return seconds

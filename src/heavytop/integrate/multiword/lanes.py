@@ -19,9 +19,7 @@ from typing import Any
 import numpy
 from numpy.typing import NDArray
 
-from heavytop.errors import InputError
-from heavytop.guard import processors
-from heavytop.integrate.ensemble import in_threads, one_kind
+from heavytop.integrate.ensemble import in_threads, work_of
 from heavytop.integrate.heyoka.lanes import LaneRun, Work
 from heavytop.integrate.multiword.engines import DoubleDouble, choose, compiled_lanes, floats, wanted_tolerance
 from heavytop.integrate.multiword.motions import (
@@ -35,12 +33,12 @@ from heavytop.integrate.trajectory import EnsembleObserver, Finished, Outcome, P
 from heavytop.multiword.codegen.machine_code import LANES, Doubles
 from heavytop.multiword.codegen.recurrence import LEAST_LOW_ORDER
 from heavytop.multiword.double_double.double_double_run import terms
-from heavytop.multiword.double_double.eight_lane_run import Eight, exact_state
+from heavytop.multiword.double_double.eight_lane_run import LEFT, Eight, exact_state
 from heavytop.multiword.fixed_point.fixed_point_run import TINY_BITS
+from heavytop.multiword.pairs import Numerators, Pairs
 from heavytop.multiword.problem import Scaled
-from heavytop.precision import DOUBLE_DOUBLE, exact, number, require
+from heavytop.precision import DOUBLE_DOUBLE
 from heavytop.top.equations import HEAVY_TOP, Parameters
-from heavytop.top.heavy_top import check_times
 
 _FIRST_CHUNK = 64
 _RISE = 2
@@ -77,7 +75,7 @@ def first_low_order(arithmetic: DoubleDouble) -> int:
 
 
 class WordsLanes:
-    """One thread's eight lanes.
+    """The eight lanes of a thread.
 
     seconds: of compiling.  others: where problems go that need another arithmetic.
     """
@@ -145,7 +143,7 @@ class WordsLanes:
             if not scaled.rest:
                 return motion
             for _ in self.work.times:
-                self._record(motion, motion.exactly(scaled.state))
+                self.work.keep(motion, motion.exactly(scaled.state))
             self._finish(motion, Outcome.SUCCESS, Fraction(0), 0)
         return None
 
@@ -153,7 +151,7 @@ class WordsLanes:
         """The next time of the motion in a lane; at 0 it is there already.  Without one left it is over."""
         motion = self.lanes[lane]
         if not motion.times and not motion.target:
-            self._record(motion, motion.exactly(motion.scaled.state))
+            self.work.keep(motion, motion.exactly(motion.scaled.state))
         if len(motion.times) == len(self.work.times):
             steps = eight.taken(lane, self.work.step_limit)
             self._leave(eight, lane, Outcome.SUCCESS, steps + 1)
@@ -187,17 +185,11 @@ class WordsLanes:
         samples = eight.samples({lane: motion.target for lane, motion in self.lanes.items()})
         for lane, words in samples.items():
             motion = self.lanes[lane]
-            if self._record(motion, motion.native(words)):
-                self._aim(eight, lane)
-            else:
+            if (native := motion.native(words)) is None:  # too large for the format
                 self._leave(eight, lane, Outcome.NON_FINITE, eight.taken(lane, self.work.step_limit))
-
-    def _record(self, motion: _Motion, native: Any) -> bool:
-        """Keep a sample, or send it to the observer; False where absent, being too large for the format."""
-        if native is None:
-            return False
-        self.work.keep(motion, native)
-        return True
+            else:
+                self.work.keep(motion, native)
+                self._aim(eight, lane)
 
     def _leave(self, eight: Eight, lane: int, outcome: Outcome, steps: int) -> None:
         motion = self.lanes.pop(lane)
@@ -233,23 +225,12 @@ def propagate_multiword_ensemble(
     Raises InputError for no problems, for problems of several kinds, for times out of order, for fewer than 1 thread,
     and what that raises.
     """
-    first = one_kind(problems)
-    require(first.precision)
-    targets = [number(time, first.precision) for time in check_times(times)]
-    threads = processors() if threads is None else threads
-    if threads < 1:
-        raise InputError(f"{threads} threads make no ensemble.", "Use 1 thread or more.")
+    first, work = work_of(problems, times, step_limit, observer)
     arithmetic = floats(wanted_tolerance(first.precision, tolerance))
-    work = Work(
-        None, targets, [exact(t) for t in targets], step_limit, observer is not None, deque(enumerate(problems))
-    )
-    moves = targets[-1] != 0 and (step_limit is None or step_limit > 0)
-    if arithmetic is not None and first.xi is None and moves:
-        seconds = compiled_lanes(first.system)
-        in_lanes = partial(_in_lanes, work, arithmetic, tolerance, seconds)
-        return in_threads(in_lanes, work, min(threads, -(-len(problems) // LANES)), observer, finished)
-    one_by_one = partial(_one_by_one, work, tolerance)
-    return in_threads(one_by_one, work, min(threads, len(problems)), observer, finished)
+    if arithmetic is not None and first.xi is None and work.moves:
+        run = partial(_in_lanes, work, arithmetic, tolerance, compiled_lanes(first.system))
+        return in_threads(run, work, threads, LANES, observer, finished)
+    return in_threads(partial(_one_by_one, work, tolerance), work, threads, 1, observer, finished)
 
 
 def _in_lanes(work: Work, arithmetic: DoubleDouble, tolerance: Fraction | None, seconds: float) -> None:
@@ -271,120 +252,12 @@ def _alone(work: Work, tolerance: Fraction | None, index: int, problem: Problem)
     work.finish(index, integrate_to_samples(problem, work.targets, tolerance, work.step_limit, observer, work.check))
 
 
-# Arrays of double-doubles as a ring, so that first integrals written once are evaluated for many motions at once.
-#
-# Relative errors of a few 2^-104 an operation (Dekker 1971; Joldes, Muller, Popescu 2017), while no product of two
-# words leaves the normal range: |values| from 1e-140 to 1e140.
-
-
-_SPLIT = 134217729.0
-"""2^27 + 1, of Dekker's splitting."""
-
-
-@dataclass(frozen=True, slots=True)
-class Pairs:
-    """high + low, arrays of one shape with |low| <= ulp(high)/2."""
-
-    high: NDArray[numpy.float64]
-    low: NDArray[numpy.float64]
-
-    @classmethod
-    def of(cls, value: Pairs | Doubles | float) -> Pairs:
-        """An array or a number that doubles hold."""
-        if isinstance(value, Pairs):
-            return value
-        high = numpy.asarray(value, float)
-        return cls(high, numpy.zeros_like(high))
-
-    def __add__(self, other: Pairs | Doubles | float) -> Pairs:
-        one = Pairs.of(other)
-        total, off = _two_sum(self.high, one.high)
-        low, rest = _two_sum(self.low, one.low)
-        total, off = _quick(total, off + low)
-        return type(self)(*_quick(total, off + rest))
-
-    __radd__ = __add__
-
-    def __neg__(self) -> Pairs:
-        return type(self)(-self.high, -self.low)
-
-    def __sub__(self, other: Pairs | Doubles | float) -> Pairs:
-        return self.__add__(-Pairs.of(other))
-
-    def __rsub__(self, other: Pairs | Doubles | float) -> Pairs:
-        opposite = -self
-        return opposite.__add__(other)
-
-    def __mul__(self, other: Pairs | Doubles | float) -> Pairs:
-        one = Pairs.of(other)
-        product, off = _two_product(self.high, one.high)
-        return type(self)(*_quick(product, off + (self.high * one.low + self.low * one.high)))
-
-    __rmul__ = __mul__
-
-    def __truediv__(self, other: Pairs | Doubles | float) -> Pairs:
-        one = Pairs.of(other)
-        first = self.high / one.high
-        rest = self - one * first
-        second = rest.high / one.high
-        third = (rest - one * second).high / one.high
-        two = Pairs(*_quick(*_two_sum(first, second)))
-        return two.__add__(third)
-
-    def __getitem__(self, where: Any) -> Pairs:
-        return type(self)(self.high[where], self.low[where])
-
-    def __abs__(self) -> Pairs:
-        sign = numpy.where(self.high < 0, -1.0, 1.0)
-        return Pairs(sign * self.high, sign * self.low)
-
-
-class Numerators(Pairs):
-    """Pairs whose quotients have three words each, as constants of the machine code have: (3, ...).
-
-    The words are right to some 2^-150 where divisor and dividend are sums of few doubles.
-    """
-
-    __slots__ = ()
-
-    def __truediv__(self, other: Any) -> Any:
-        words, rest = [], self
-        for _ in range(3):
-            words.append(rest.high / other.high)
-            rest = rest.__sub__(other * words[-1])  # type: ignore[assignment]
-        return numpy.array(words)
-
-
-def _two_sum(a: Doubles, b: Doubles) -> tuple[Doubles, Doubles]:
-    total = a + b
-    part = total - a
-    return total, (a - (total - part)) + (b - part)
-
-
-def _quick(a: Doubles, b: Doubles) -> tuple[Doubles, Doubles]:
-    total = a + b
-    return total, b - (total - a)
-
-
-def _halves(a: Doubles) -> tuple[Doubles, Doubles]:
-    product = _SPLIT * a
-    high = product - (product - a)
-    return high, a - high
-
-
-def _two_product(a: Doubles, b: Doubles) -> tuple[Doubles, Doubles]:
-    product = a * b
-    (a1, a2), (b1, b2) = _halves(a), _halves(b)
-    return product, ((a1 * b1 - product) + a1 * b2 + a2 * b1) + a2 * b2
-
-
 # Many short motions of heavy tops at the same times, as arrays: double-double in lanes, no exact number per motion.
 #
 # What the code above does motion by motion, for usual ones: doubles of moderate size,
 # forwards.
 
 
-_ROUNDS = 4096
 _LARGE = 2.0**60
 _RESTING = 2.0 ** (-2 * TINY_BITS)
 _UNITS = numpy.eye(6).tolist()
@@ -433,7 +306,7 @@ class _Grid:
         self.order = numpy.argsort(numpy.maximum(speed, numpy.sqrt(torque)), kind="stable")
         self.usual = self._are_usual()
         self.good = numpy.zeros(len(starts), bool)
-        self.found = numpy.full((len(starts), len(times), 12), numpy.nan)
+        self.samples = numpy.full((len(starts), len(times), 12), numpy.nan)
 
     def _are_usual(self) -> Any:
         """Motions of which double-double keeps every component, that do not rest."""
@@ -460,22 +333,19 @@ class _Grid:
             self._eight(eight, eights, step_limit)
             outgrown = [eight.status(lane) is None for lane in range(LANES)]
             larger += eights[outgrown].tolist()
-            self.good[eights] = (eight.flags == 0) & (eight.left_all() > 0)
+            self.good[eights] = (eight.flags == 0) & (eight.clock[LEFT] > 0)
         return numpy.unique(numpy.array(larger, int))
 
     def _eight(self, eight: Eight, eights: Any, step_limit: int) -> None:
         words = numpy.zeros((12, LANES))
         words[:6] = self.begin[eights].T
-        eight.put_all(words, self.constants[:, :, eights], step_limit)
+        eight.begin(slice(None), words, self.constants[:, :, eights], True, step_limit)
         for sample, targets in enumerate(self.times[eights].T):
-            eight.aim_all(targets)
-            while eight.advance(_ROUNDS) == _ROUNDS:
-                pass
-            self.found[eights, sample] = eight.sample_all(targets).T
+            self.samples[eights, sample] = eight.reach_all(targets).T
 
     def states(self) -> Pairs:
         """In the units of the problems; NaN where they are not good."""
-        high, low = (numpy.ldexp(self.found[:, :, k : k + 6], self.exponents[:, None, :]) for k in (0, 6))
+        high, low = (numpy.ldexp(self.samples[:, :, k : k + 6], self.exponents[:, None, :]) for k in (0, 6))
         total = high + low
         bad = ~self.good
         total[bad] = numpy.nan

@@ -114,9 +114,8 @@ def integrate_to_samples(
     if all(option is None for option in (step_limit, observer, between, place, mark)) and _are_many(
         pace, targets, problem
     ):
-        outcome, count, make = pace.sampled(targets, problem.precision)
-        times, states = RoundedTimes(targets[:count]), make
-        seconds = perf_counter() - began
+        outcome, states = pace.sampled(targets, problem.precision)
+        times, seconds = RoundedTimes(targets[: len(states)]), perf_counter() - began
     else:
         times, states, outcome, seconds = sampled(pace, targets, flags, began, observer, place, mark)
     ended = times, states, outcome, seconds
@@ -302,7 +301,7 @@ class _Pace(SampledRun):
 
     @property
     def steps(self) -> int:
-        """That stand."""
+        """Steps that stand."""
         return self.run.steps
 
     @property
@@ -324,65 +323,43 @@ class _Pace(SampledRun):
             self._chunk = max(1, min(4 * self._chunk, int(CHUNK_SECONDS / a_step)))
         return OUTCOMES[status]
 
-    def sampled(self, targets: Any, precision: Precision) -> tuple[Outcome, int, Callable[[], Array]]:
-        """The outcome, how many of many times are reached, and what makes the states there, as from :meth:`reach` and
+    def sampled(self, targets: Any, precision: Precision) -> tuple[Outcome, Array]:
+        """The outcome, and the states at those of many times that are reached, as from :meth:`reach` and
         :meth:`sample`, in few calls.
         """
         if targets[0] == 0:
-            outcome, count, make = self.sampled(targets[1:], precision)
+            outcome, states = self.sampled(targets[1:], precision)
             start = native_state(self.scaled.back(self.scaled.state), precision)
-            return outcome, count + 1, lambda: numpy.concatenate([[start], make()])
+            return outcome, numpy.concatenate([[start], states])
         sampler = self._of_a_grid if isinstance(self.run, Fixed) else self._of_two_words
-        sizes = numpy.array([float(size) for size in self.scaled.sizes])
-        status, count, others, make = sampler(targets, sizes, precision)
-        outcome, known = OUTCOMES[status], dict[int, Any]()
+        status, states, others = sampler(targets, numpy.array([float(size) for size in self.scaled.sizes]), precision)
         for row, state in sorted(others.items()):
             rounded = None if state is None else native_state(self.scaled.back(state), precision)
             if rounded is None:
-                outcome, count = Outcome.CAPACITY if state is None else Outcome.NON_FINITE, row
-                break
-            known[row] = rounded
-
-        def states() -> Array:
-            made: Array = make()[:count]
-            for row, state in known.items():
-                made[row] = state
-            return made
-
-        return outcome, count, states
+                return Outcome.CAPACITY if state is None else Outcome.NON_FINITE, states[:row]
+            states[row] = rounded
+        return OUTCOMES[status], states
 
     def _of_two_words(self, targets: Any, sizes: Doubles, precision: Precision) -> Any:
-        """How it ended, how many times are reached, by their rows the states that only exact numbers tell, and what
-        makes all others: to make reals takes longer than to sample.
+        """How it ended, the states at the times that are reached, and by their rows those that only exact numbers
+        tell.
         """
         assert isinstance(self.run, Floating)
         times, rate = numpy.asarray(targets), float(self.scaled.rate) * (1 if self.run.forwards else -1)
         highs = times.astype(float)
         lows = numpy.zeros(len(times)) if (times == highs).all() else (times - highs).astype(float)
         places = [[index + word for index in PLACES[: len(sizes)]] for word in (0, 8)]
-        is_double, count, others = precision == DOUBLE, 0, dict[int, tuple[Fraction, ...]]()
-        kept = [numpy.empty((len(times), len(sizes))) for _ in range(1 if is_double else 2)]
+        parts, count, others = list[Array](), 0, dict[int, tuple[Fraction, ...]]()
         for words in self.run.sampled(highs * rate, lows * rate):
-            sums = [words.take(indices, 1) for indices in places]
-            if is_double:
-                total, odd = _sums_of_columns(sums, sizes, precision)
-                others |= {count + int(row): _exact_sums(word[row] for word in sums) for row in numpy.flatnonzero(odd)}
-                sums = [total]
-            for array, values in zip(kept, sums, strict=True):
-                array[count : count + len(words)] = values
+            pair = [words.take(indices, 1) for indices in places]
+            states, odd = _sums_of_columns(pair, sizes, precision)
+            others |= {count + int(row): _exact_sums(word[row] for word in pair) for row in numpy.flatnonzero(odd)}
+            parts.append(states)
             count += len(words)
-
-        def make() -> Array:
-            if is_double:
-                return kept[0]
-            states, odd = _sums_of_columns([word[:count] for word in kept], sizes, precision)
-            for row in numpy.flatnonzero(odd):
-                states[row] = native_state(self.scaled.back(_exact_sums(word[row] for word in kept)), precision)
-            return states
-
-        return self.run.status, count, others, make
+        return self.run.status, numpy.concatenate(parts), others
 
     def _of_a_grid(self, targets: Any, sizes: Doubles, precision: Precision) -> Any:
+        """As :meth:`_of_two_words`, of a run on a grid."""
         assert isinstance(self.run, Fixed)
         instants, rate, grid = numpy.asarray(targets), self.scaled.rate, self.run.grid
         times: Doubles = instants.astype(float)
@@ -391,14 +368,8 @@ class _Pace(SampledRun):
         else:
             status, words, others = self.run.sampled([abs(exact(target)) * rate for target in targets])
 
-        def make() -> Array:
-            states, odd = _sums_of_words(words, grid, sizes, precision)
-            for row in numpy.flatnonzero(odd):
-                if row not in others:
-                    states[row] = native_state(self.scaled.back(_exact_sums(words[row])), precision)
-            return states
-
-        return status, len(words), others, make
+        states, odd = _sums_of_words(words, grid, sizes, precision)
+        return status, states, {int(row): _exact_sums(words[row]) for row in numpy.flatnonzero(odd)} | others
 
     def at(self, target: Any, time: Fraction) -> tuple[Outcome, Any]:
         """The outcome of :meth:`reach`, and the state at ``time``, rounded; None where it cannot be given."""

@@ -21,13 +21,13 @@ from itertools import pairwise
 from math import ceil, inf, isfinite
 from pathlib import Path
 from threading import Lock
-from time import monotonic, sleep
-from typing import Any, Literal, NamedTuple
+from time import monotonic
+from typing import Any, Literal
 
 import msgspec
 import numpy
 
-from heavytop.errors import InputError, PeerFailed, Unsupported
+from heavytop.errors import InputError, PeerFailed, Unsupported, argument
 from heavytop.guard import Guard, how_it_ended, stopwatch, waited_for_processor
 from heavytop.integrate.peers.contract import DEFAULT_STEP, Declared, of_quaternion, quaternion, said
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
@@ -47,14 +47,10 @@ NOT_COUNTED = {"steps": "not counted"}
 _MOST_LINE = 1 << 20
 _MOST_ERRORS = 2000
 _CHUNK = 1 << 16
-_MANY = 4
-"""States still due, from which on they are read several at a time: each waking of the reader slows the program."""
-_NAP, _NAP_SHARE, _NAP_LEFT = 1e-3, 1 / 4, 1 / 3
-"""Seconds, part of the seconds so far, and part of those that are left, between two readings of such states."""
 _LOOK = 0.1
 """Seconds between two looks whether a silent program is still there."""
-_AWAKE, _AWAKE_AT_END = 2e-4, 1e-3
-"""Seconds for which a short answer, and the last states of a long one, are waited for awake: to be woken takes 1e-4."""
+_AWAKE = 2e-4
+"""Seconds for which an answer is waited for awake: to be woken takes 1e-4."""
 _FAREWELL = 0.3
 """Seconds that a program has to end after `quit`."""
 _MOST_OVERHEAD = 1e-3
@@ -64,10 +60,6 @@ _LEAST_SHARE = 0.1
 _RESOLUTION = 1e-4
 """Seconds by which requests without times differ, on a busy machine; fewer are not resolved."""
 _DECIMAL = rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_OF_STATES = b"0123456789+-.eE \tsta"
-"""The characters of lines of states in decimal."""
-_as_doubles = msgspec.json.Decoder(list[float]).decode
-"""Reads a JSON list of numbers, each rounded correctly, in a tenth of the time that `float` takes."""
 _STATE_OF_DOUBLES = {width: re.compile(rb"state(?:[ \t]+" + _DECIMAL + rb"){%d}" % (1 + width)) for width in (6, 7, 9)}
 _PAIRS = {"steps": int, "evaluations": int, "seconds": float, "joint": float}
 
@@ -181,9 +173,8 @@ class CommandIntegrator:
         control = self.command.control
         for name in settings:
             if name != control:
-                raise InputError(
-                    f"The integrator {self.command.name} has no {name}.", f"It is set by: {control or '-'}."
-                )
+                remedy = f"Leave it out: {argument(control)} sets its accuracy." if control else "Leave it out."
+                raise InputError(f"The integrator {self.command.name} has no {argument(name)}.", remedy)
         if not control:
             return None
         value = settings.get(control)
@@ -269,7 +260,6 @@ class ProgramRequest:
         self.problem, self.times, self.control, self.hex = problem, list(times), control, hexadecimal
         self.quaternion = quaternion
         self.width = 7 if quaternion else 6 if problem.xi is None else 9
-        self.written = _times_written(self.times, problem.precision, hexadecimal)
 
     def text(self, label: int) -> bytes:
         """Its lines."""
@@ -285,7 +275,7 @@ class ProgramRequest:
             "quaternion": self._rounded(quaternion(self.problem)) if self.quaternion else [],
             "precision": [precision.name],
             "setting": self._numbers([] if self.control is None else [self.control]),
-            "times": [str(len(self.times)), *self.written.texts],
+            "times": [str(len(self.times)), *self._numbers(self.times)],
         }
         if self.body is not None:
             lines |= {f"body {name}": self._rounded(values) for name, values in self._body(self.body).items()}
@@ -303,28 +293,6 @@ class ProgramRequest:
         return numbers_texts(values, self.problem.precision, self.hex)
 
 
-class _Times(NamedTuple):
-    """Times of a request, their texts, and in double their values."""
-
-    times: list[Fraction]
-    form: tuple[Precision, bool]
-    texts: list[str]
-    doubles: list[float]
-
-
-_last_times = _Times([], (DOUBLE, False), [], [])
-
-
-def _times_written(times: list[Fraction], precision: Precision, hexadecimal: bool) -> _Times:
-    """Times of the request before, where they are the same: many starts of a row are asked for at the same times."""
-    global _last_times
-    last, form = _last_times, (precision, hexadecimal)
-    if last.form != form or last.times != times:
-        doubles = [float(time) for time in times] if precision == DOUBLE else []
-        last = _last_times = _Times(times, form, numbers_texts(times, precision, hexadecimal), doubles)
-    return last
-
-
 class Reply:
     """The answer of a program: states of the format, counts, and what it says went wrong; wall: seconds here."""
 
@@ -335,47 +303,8 @@ class Reply:
         self.counts: dict[str, Any] = {}
         self.failure = ""
         self.wall = 0.0
-        self._doubles = request.written.doubles
+        self._doubles = [float(time) for time in request.times] if self.precision == DOUBLE else []
         self._pattern = _STATE_OF_DOUBLES[request.width]
-
-    @property
-    def due(self) -> int:
-        """How many states are still to come."""
-        return len(self.request.times) - len(self.states)
-
-    def nap(self, seconds: float) -> float:
-        """Seconds until the next reading, ``seconds`` after the request: the fewer are left, the sooner.
-
-        What is left is estimated by the time that the last state has reached, as if all steps were equal.
-        """
-        reached = self.request.times[len(self.states) - 1] / self.request.times[-1] if self.states else 0
-        left = seconds * float((1 - reached) / reached) if reached else inf
-        return min(_NAP_SHARE * seconds, _NAP_LEFT * left)
-
-    def take_states(self, lines: list[bytes]) -> int:
-        """Takes the states of doubles that these lines begin with, as many as are due and not one beyond; their count.
-
-        0 where anything about them is odd: each line is then looked at by itself, and says what.
-        """
-        index = len(self.states)
-        count = min(len(lines), len(self._doubles) - index)
-        block = b" ".join(lines[:count])
-        if count < 2 or block.translate(None, _OF_STATES) or b"-0 " in block + b" ":  # as an integer -0 has no sign
-            return 0
-        words = block.split()
-        width = 2 + self.request.width
-        if len(words) != count * width or words[::width] != [b"state"] * count:
-            return 0
-        del words[::width]
-        try:
-            numbers = _as_doubles(b"[" + b",".join(words) + b"]")
-        except msgspec.DecodeError:  # 1. or +1, which JSON does not know; or NaN
-            return 0
-        values = numpy.array(numbers).reshape(count, width - 1)
-        if values[:, 0].tolist() != self._doubles[index : index + count] or not numpy.isfinite(values).all():
-            return 0
-        self.states += list(values[:, 1:].copy())
-        return count
 
     def take(self, line: bytes) -> bool:
         """Takes a line, and says whether it was the last; raises PeerFailed for one that breaks the protocol."""
@@ -398,7 +327,7 @@ class Reply:
         if words[0] != "done":
             raise PeerFailed(f"{self.name} wrote {said(repr(' '.join(words)))}, which the protocol does not know")
         self._take_counts(words[1:])
-        if self.due:
+        if len(self.states) < len(self.request.times):
             raise PeerFailed(f"{self.name} said done after {len(self.states)} of {len(self.request.times)} states")
         return True
 
@@ -452,18 +381,10 @@ class Reply:
 class _Greeting:
     """Takes the first line of a program: ``ready``, its name and version."""
 
-    due, text = 0, ""
+    text = ""
 
     def __init__(self, name: str) -> None:
         self.name = name
-
-    def nap(self, _seconds: float) -> float:
-        """None is needed."""
-        return 0.0
-
-    def take_states(self, _lines: list[bytes]) -> int:
-        """None."""
-        return 0
 
     def take(self, line: bytes) -> bool:
         """Raises PeerFailed for another line."""
@@ -563,8 +484,7 @@ class Session:
             left = deadline - monotonic()
             if left <= 0:
                 raise self._failed(f"did not say {awaited} within {seconds:g} s", answered=True)
-            now = monotonic()
-            awake = not waiting and reply.due < _MANY and now < awake_until
+            awake = not waiting and monotonic() < awake_until
             waited = waited_for_processor()
             events = self._poll.poll(0)
             if not events:
@@ -574,9 +494,6 @@ class Session:
                 events = self._poll.poll(1000 * min(left, _LOOK))
             if not events and self.process.poll() is not None and not self._drained():
                 raise self._failed(f"{self._end()} before it said {awaited}")
-            if events and not waiting and reply.due >= _MANY:
-                sleep(min(_NAP, reply.nap(monotonic() - began)))
-                awake_until = monotonic() + _AWAKE_AT_END
             self._receive([descriptor for descriptor, _ in events], awaited)
 
     def _write(self, waiting: memoryview) -> memoryview:
@@ -594,8 +511,7 @@ class Session:
                 raise self._failed(f"wrote a line of more than {_MOST_LINE} characters")
             return False
         *lines, self._unread = self._unread.split(b"\n")
-        taken = reply.take_states(lines)
-        for count, line in enumerate(lines[taken:], taken + 1):
+        for count, line in enumerate(lines, 1):
             try:
                 last = reply.take(line)
             except PeerFailed as error:

@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeVar
 import numpy
 
 from heavytop import precision as vectors
-from heavytop.errors import InputError, PeerFailed, quoted
+from heavytop.errors import InputError, PeerFailed, Unsupported, quoted
 from heavytop.integrate.peers.contract import DEFAULT_STEP, Declared, of_quaternion, quaternion, with_tolerance
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.multiword.codegen.machine_code import Doubles
@@ -86,6 +86,7 @@ class Solution:
     states: as wide as the start, shape (m, 6), (m, 9) or (m, 7), one for each of the first m <= n times.  reached: the
     last time it stood at.  evaluations: of the field.  compile: seconds of the run that went into compiling.
     outcome: how a run that did not come to the end failed; :func:`double_peer` sees by itself to the rest.
+    tolerance: in force, as text, where the library does not take the one asked for.
     """
 
     states: Any
@@ -94,6 +95,7 @@ class Solution:
     evaluations: int | None = None
     compile: float = 0.0
     outcome: Outcome = Outcome.INCOMPLETE
+    tolerance: str = ""
 
 
 Solve = Callable[[Request], Solution]
@@ -155,7 +157,10 @@ def double_peer(
         began = perf_counter()
         solved = _from_start(name, request, solve)
         seconds = {"compile": solved.compile, "run": perf_counter() - began - solved.compile}
-        flags = {control: repr(request.control), "field": "python" if compiler().__module__ == __name__ else "numba"}
+        flags = {
+            control: solved.tolerance or repr(request.control),
+            "field": "python" if compiler().__module__ == __name__ else "numba",
+        }
         return _judged(problem, name, order, request, solved, seconds, flags)
 
     def with_step(
@@ -207,7 +212,7 @@ def _declared(names: Sequence[str] | None) -> tuple[str, ...] | None:
 
 def _given(name: str, control: str, problem: Problem, times: Sequence[Fraction], value: Fraction) -> Request:
     if problem.precision != DOUBLE:
-        raise InputError(f"{name} has no {problem.precision.name}.", "Use double.")
+        raise Unsupported(f"{name} has no {problem.precision.name}.", "Use double.")
     if value <= 0 or (control == "tolerance" and value > 1):
         limits = "between 0 and 1" if control == "tolerance" else "above 0"
         raise InputError(f"{name} cannot use the {control} {decimal_text(value, 6)}.", f"Give one {limits}.")
@@ -224,7 +229,11 @@ def _from_start(name: str, request: Request, solve: Solve) -> Solution:
     later = replace(request, times=request.times[at_start:].copy())
     solved = solve(later) if len(later.times) else Solution(numpy.empty((0, request.width)), 0.0, 0, 0)
     if not isinstance(solved, Solution):
-        raise PeerFailed(f"{name} returned a {type(solved).__name__} instead of Solution")
+        raise PeerFailed(
+            f"{name} returned a {type(solved).__name__} instead of Solution",
+            "from heavytop.integrate.peers.double import Solution; return Solution(states, reached, steps): a state of "
+            f"{request.width} numbers for each time, the last time reached, and the number of steps.",
+        )
     if not at_start:
         return solved
     states = _states(name, solved.states, len(later.times), request.width)

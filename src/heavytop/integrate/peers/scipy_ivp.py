@@ -16,7 +16,8 @@ def _solver(method: str) -> Solve:
         from scipy.integrate import solve_ivp
 
         field, seconds = timed(rates, request.system, request.width)
-        dense = len(request.times) > 1
+        dense, relative = len(request.times) > 1, max(request.control, _FINEST)
+        in_force = "" if relative == request.control else f"relative {relative:.3g}, absolute {request.control:.3g}"
         try:
             run = solve_ivp(
                 field,
@@ -24,7 +25,7 @@ def _solver(method: str) -> Solve:
                 request.start,
                 method=method,
                 args=(request.numbers,),
-                rtol=max(request.control, _FINEST),
+                rtol=relative,
                 atol=request.control,
                 dense_output=dense,
             )
@@ -34,7 +35,7 @@ def _solver(method: str) -> Solve:
             return Solution([], 0.0, 0, None, seconds, Outcome.NON_FINITE)  # Radau, whose matrices must be finite
         covered = request.times[abs(request.times) <= abs(run.t[-1])]
         states = run.sol(covered).T if dense else run.y.T[-1:] if run.success else []
-        return Solution(states, run.t[-1], len(run.t) - 1, run.nfev, seconds, Outcome.STEP_TOO_SMALL)
+        return Solution(states, run.t[-1], len(run.t) - 1, run.nfev, seconds, Outcome.STEP_TOO_SMALL, in_force)
 
     return solve
 

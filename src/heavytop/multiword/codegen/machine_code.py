@@ -29,9 +29,15 @@ Integers = NDArray[numpy.int64]
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 INTEGERS = ctypes.POINTER(ctypes.c_int64)
 
-Signatures: TypeAlias = Mapping[str, tuple[Any, Sequence[Any]]]
-_TYPES = {"": None, "q": ctypes.c_int64, "d": ctypes.c_double, "Q": INTEGERS, "D": DOUBLES}
-_LETTERS = {kind: letter for letter, kind in _TYPES.items()}
+Signatures: TypeAlias = Mapping[str, Sequence[str]]
+"""The types of the result and of the arguments of each function, as LLVM names them."""
+_TYPES: dict[str, Any] = {
+    "void": None,
+    "i64": ctypes.c_int64,
+    "double": ctypes.c_double,
+    "i64*": INTEGERS,
+    "double*": DOUBLES,
+}
 
 P = ParamSpec("P")
 
@@ -44,7 +50,7 @@ class Machine:
     """Compiled functions by name; they keep nothing between calls, so that any thread may call them at any time.
 
     seconds: what compiling or reading took.  engine: keeps the machine code in memory.
-    code, signatures: the machine code as a file, and of each function the types of its result and arguments.
+    code, signatures: the machine code as a file, and the types of its functions.
     """
 
     functions: dict[str, Any]
@@ -101,22 +107,14 @@ def _from_disk(make: Callable[..., Machine], arguments: tuple[Any, ...]) -> Mach
     began = perf_counter()
     key = code_cache.key_of(make, arguments, Processor.here())
     if (cached := code_cache.read(key)) is not None:
-        code, beside = cached
-        letters = json.loads(beside)
-        kinds = {name: [_TYPES[letter] for letter in row] for name, row in letters.items()}
-        return _linked(code, {name: (result, rest) for name, (result, *rest) in kinds.items()}, began)
+        return _linked(cached[0], json.loads(cached[1]), began)
     machine = make(*arguments)
-    letters = {
-        name: [_LETTERS[kind] for kind in (result, *rest)] for name, (result, rest) in machine.signatures.items()
-    }
-    code_cache.write(key, machine.code, json.dumps(letters).encode())
+    code_cache.write(key, machine.code, json.dumps(machine.signatures).encode())
     return machine
 
 
-def compiled(module: ir.Module, signatures: Signatures, processor: Processor | None = None) -> Machine:
-    """The functions of ``module`` as machine code.
-
-    signatures: for each function the ctypes of its result and arguments.  processor: None for this one.
+def compiled(module: ir.Module, processor: Processor | None = None) -> Machine:
+    """The functions of ``module`` that are not internal, as machine code; processor: None for this one.
 
     A call of a function lets other Python threads run.
     """
@@ -135,6 +133,8 @@ def compiled(module: ir.Module, signatures: Signatures, processor: Processor | N
         passes = binding.create_pass_builder(target, options)
         passes.getModulePassManager().run(parsed, passes)
         code = target.emit_object(parsed)
+    called = (made for made in module.functions if not (made.is_declaration or made.linkage == "internal"))
+    signatures = {made.name: [str(kind) for kind in (made.ftype.return_type, *made.ftype.args)] for made in called}
     return _linked(code, signatures, began)
 
 
@@ -161,8 +161,8 @@ def _linked(code: bytes, signatures: Signatures, began: float) -> Machine:
         engine.add_object_file(binding.ObjectFileRef.from_data(code))
         engine.finalize_object()
         functions = {
-            name: ctypes.CFUNCTYPE(result, *arguments)(engine.get_function_address(name))
-            for name, (result, arguments) in signatures.items()
+            name: ctypes.CFUNCTYPE(*(_TYPES[kind] for kind in kinds))(engine.get_function_address(name))
+            for name, kinds in signatures.items()
         }
         return Machine(functions, perf_counter() - began, engine, code, signatures)
 
@@ -563,13 +563,18 @@ class Stepping(ABC):
 class Following(ABC):
     """Writes a function that takes steps and samples by turns, until all times are done or there were enough steps.
 
-    arrays: what the function ``advance`` takes but its number of steps.  counts, status: as of :class:`Stepping`.
+    arrays: what the function ``advance`` takes but its number of steps.  clock, counts, status: as of
+    :class:`Stepping`.
     progress: times and steps done.  times_count: of the times.  most: of the steps.  result: of the samples.
     """
 
-    def __init__(self, code: Code, arrays: Sequence[Operand], counts: Operand, status: int) -> None:
-        self.code, self.arrays, self.counts, self.status = code, arrays, counts, status
+    def __init__(self, code: Code, arrays: Sequence[Operand], clock: Operand, counts: Operand, status: int) -> None:
+        self.code, self.arrays, self.clock, self.counts, self.status = code, arrays, clock, counts, status
         self.progress, self.times_count, self.most, self.result = code.arguments[-4:]
+
+    def time(self, index: int) -> Operand:
+        """A double of the clock."""
+        return self.code.load_one(self.clock, index)
 
     @abstractmethod
     def covered(self, index: Operand) -> Operand:

@@ -179,11 +179,11 @@ def log2(value: Operand) -> Operand:
 def power_of_two(code: Code, exponent: Operand, most: int, bits: int) -> Operand:
     """2^exponent to 1e-3, at most 2^most, its significand cut to that many bits; of a double, or of each of eight."""
     bounded = code.larger(code.smaller(exponent, most), _LEAST_EXPONENT)
-    whole = (bounded - _LEAST_EXPONENT).to_integer()
-    fraction = bounded - _LEAST_EXPONENT - whole.to_double()
+    integral = (bounded - _LEAST_EXPONENT).to_integer()
+    fraction = bounded - _LEAST_EXPONENT - integral.to_double()
     significand = (1.0 + _bent(fraction, _POWER)).bits()
     kept = ((1 << _FRACTION_BITS) - 1) ^ ((1 << (_FRACTION_BITS + 1 - bits)) - 1)
-    biased = whole + (_BIAS + int(_LEAST_EXPONENT))
+    biased = integral + (_BIAS + int(_LEAST_EXPONENT))
     shifted = biased << _FRACTION_BITS
     return ((significand & kept) + shifted).of_bits()
 

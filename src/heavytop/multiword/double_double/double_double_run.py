@@ -215,9 +215,8 @@ class Floating(ResumableRun):
         return step if self.forwards else -step
 
     def coefficients(self, n: int) -> tuple[Fraction, ...]:
-        step = self.time - self._time(dd.BEGAN)
-        power = (step if self.forwards else -step) ** n
-        return tuple(value * power for value in _exact_state(self._row(n), len(self.problem.state)))
+        power = self.length**n
+        return tuple(value * power for value in self.derivatives(n))
 
     def _row(self, n: int) -> Doubles:
         """Both words of y_n, vector by vector."""
@@ -455,73 +454,38 @@ class LaneOrders:
             if sign < 0:
                 a, rest = -a, -rest
             at = 3 * (component % 3)
-            whole = code.load(right, LANES * second)
-            for k, (one, factor) in enumerate(((a, coarse), (a, fine), (rest, whole))):
+            unsplit = code.load(right, LANES * second)
+            for k, (one, factor) in enumerate(((a, coarse), (a, fine), (rest, unsplit))):
                 result[at + k] = code.fma(one, factor, result[at + k])
         return result
 
     def _plain_orders(self, start: Operand, stop: Operand, omega: Products) -> list[Operand]:
         """y_(start+1) to y_stop in plain doubles; omega: those products of Ω that are needed."""
-        code, count = self.code, stop - start
-        odd = count & 1
-        code.loop(0, odd, lambda _, values: self._plain_order(omega, start), [])
-        begin = start + odd
-        two = partial(self._two_plain_orders, omega)
-        return code.loop(0, count.unsigned_shift(1), lambda k, _: two(begin + (k << 1)), [])
 
-    def _plain_order(self, group: Products, n: Operand) -> None:
-        """y_(n+1)."""
+        def order(n: Operand, _: list[Operand]) -> None:
+            sums = self.code.loop(0, n + 1, partial(self._plain_products, n, omega), [self.code.zero] * 6)
+            self._plain_rates(n, sums)
 
-        def products(m: Operand, sums: list[Operand]) -> list[Operand]:
-            return self._both(group, self._highs(m), self._highs(n - m), sums)
+        return self.code.loop(start, stop, order, [])
 
-        sums = self.code.loop(0, n + 1, products, [self.code.zero] * 6)
-        self._plain_rates(n, range(6), sums)
-
-    def _two_plain_orders(self, group: Products, n: Operand) -> None:
-        """y_(n+1) and y_(n+2).
-
-        Sums of γ_(n+1) wait for each other, twice as long as those of Ω_(n+1); so those of y_(n+2), which begin with
-        Ω_(n+1), go beside them.
-        """
-        code = self.code
-        after = n + 1
-
-        def alone(m: Operand, sums: list[Operand]) -> list[Operand]:
-            return self._plain(group, self._highs(m), self._highs(n - m), sums)
-
-        def beside(m: Operand, values: list[Operand]) -> list[Operand]:
-            y, omega, following = self._highs(m), self._highs(n - m)[:3], values[9:]
-            gamma = self._plain(_GAMMA, y, omega, values[:3])
-            return [*gamma, *self._both(group, y, following, values[3:9]), *omega]
-
-        self._plain_rates(n, range(3), code.loop(0, after, alone, [code.zero] * 3))
-        values = code.loop(0, after, beside, [*[code.zero] * 9, *self._highs(after)[:3]])
-        self._plain_rates(n, range(3, 6), values[:3])
-        last = self._both(group, self._highs(after), self._highs(code.integer(0)), values[3:9])
-        self._plain_rates(after, range(6), last)
+    def _plain_products(self, n: Operand, omega: Products, m: Operand, sums: list[Operand]) -> list[Operand]:
+        """Sums with the products of y_m and Ω_(n−m)."""
+        left, right, result = self._highs(m), self._highs(n - m), list(sums)
+        for first, second, component, sign in (*omega, *_GAMMA):
+            factor = left[first] if sign > 0 else -left[first]
+            result[component] = self.code.fma(factor, right[second], result[component])
+        return result
 
     def _highs(self, n: Operand) -> list[Operand]:
         """The high words of y_n."""
         row = self.row(n)
         return [self.code.load(row, LANES * i) for i in range(6)]
 
-    def _both(self, group: Products, y: list[Operand], omega: list[Operand], sums: list[Operand]) -> list[Operand]:
-        return [*self._plain(group, y, omega, sums[:3]), *self._plain(_GAMMA, y, omega, sums[3:])]
-
-    def _plain(self, group: Products, y: list[Operand], omega: list[Operand], sums: list[Operand]) -> list[Operand]:
-        """Three sums with the products of Ω and of the same part of y."""
-        code, result = self.code, list(sums)
-        for first, second, component, sign in group:
-            factor = y[first] if sign > 0 else -y[first]
-            result[component % 3] = code.fma(factor, omega[second], result[component % 3])
-        return result
-
-    def _plain_rates(self, n: Operand, components: Sequence[int], sums: list[Operand]) -> None:
-        """Components of y_(n+1) from their sums."""
+    def _plain_rates(self, n: Operand, sums: list[Operand]) -> None:
+        """y_(n+1) from its sums."""
         code = self.code
         y, following, quotient = self.row(n), self.row(n + 1), self._quotient(n)[0]
-        for i, products in zip(components, sums, strict=True):
+        for i, products in enumerate(sums):
             total = self._coefficient(i)[0] * products if i < 3 else products
             for k, component, source in self.terms:
                 if component == i:

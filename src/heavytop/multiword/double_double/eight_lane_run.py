@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
 import math
-from collections.abc import Sequence
 from fractions import Fraction
 from functools import reduce
 from operator import and_
@@ -13,11 +11,9 @@ from typing import Any
 import numpy
 
 from heavytop.multiword.codegen.machine_code import (
-    DOUBLES,
     INT,
     INT_POINTER,
     INT_VECTOR,
-    INTEGERS,
     LANES,
     POINTER,
     Doubles,
@@ -93,12 +89,7 @@ def build(system: System, processor: Processor | None = None) -> Machine:
     module = ir.Module("lanes")
     _Round(module, system).write()
     _write_sample(module)
-    integer = ctypes.c_int64
-    signatures: dict[str, tuple[ir.Type, Sequence[ir.Type]]] = {
-        "advance": (integer, [DOUBLES, DOUBLES, INTEGERS, *[integer] * 3, DOUBLES, DOUBLES, DOUBLES, integer]),
-        "sample": (None, [DOUBLES, integer, DOUBLES, DOUBLES]),
-    }
-    return compiled(module, signatures, processor)
+    return compiled(module, processor)
 
 
 def _write_sample(module: ir.Module) -> None:
@@ -257,6 +248,7 @@ class _Round:
 
 
 _NO_LIMIT = 2.0**53
+_ROUNDS = 4096
 
 
 machine = once(build)
@@ -276,88 +268,67 @@ class Eight:
         self.schedule, self.low_order = schedule, max(LEAST_LOW_ORDER, min(low_order, schedule.order - 1))
         self.pair_order = min(self.low_order, schedule.pair_order(self.low_order))
         self.terms = terms(system)
-        self.words, self.clock = doubles(12 * LANES), doubles(CLOCK * LANES)
+        self.words, self.clock = doubles(12 * LANES).reshape(12, LANES), doubles(CLOCK * LANES).reshape(CLOCK, LANES)
+        self.constants = doubles(24 * (3 + len(self.terms))).reshape(-1, 3, LANES)
         self.flags = numpy.zeros(LANES, numpy.int64)
-        self.constants = doubles(24 * (3 + len(self.terms)))
         self.quotients = doubles(2 * schedule.order)
         self.quotients[:] = [word for n in range(1, schedule.order + 1) for word in split(Fraction(1, n))]
         self.scratch = doubles(SCRATCH)
         self.moving = [pointer(array) for array in (self.words, self.clock, self.flags)]
         self.tables = [pointer(array) for array in (self.constants, self.quotients, self.scratch)]
-        self.behind, self.sampled = doubles(2 * LANES), doubles(12 * LANES)
+        self.behind, self.sampled = doubles(2 * LANES).reshape(2, LANES), doubles(12 * LANES).reshape(12, LANES)
         self.sampling = [pointer(array) for array in (self.behind, self.sampled)]
-        self.signs = [1] * LANES
-        self._set(ROOM, [schedule.room] * LANES)
-        self._set(REACH, [schedule.reach] * LANES)
-        self._set(DEPTH, [schedule.depth] * LANES)
-
-    def _set(self, vector: int, values: Any) -> None:
-        self.clock[LANES * vector : LANES * (vector + 1)] = values
+        self.clock[[ROOM, REACH, DEPTH]] = [[schedule.room], [schedule.reach], [schedule.depth]]
 
     def put(self, lane: int, problem: Scaled, forwards: bool, most: int | None) -> None:
         """A motion at its beginning; most: the steps that it may take."""
-        for i, value in enumerate(problem.state):
-            self.words[LANES * i + lane], self.words[ROW + LANES * i + lane] = split(value)
         rows = problem.coefficients.vectors[0]
-        sources = [rows[0][i] for i in range(3)] + [rows[row][component] for row, component, _ in self.terms]
-        for k, value in enumerate(sources):
-            self.constants[24 * k + lane : 24 * (k + 1) : LANES] = split_constant(value)
-        self.flags[lane] = OK
-        self.signs[lane] = 1 if forwards else -1
-        values = {TIME: 0.0, TIME + 1: 0.0, SIGN: float(self.signs[lane])}
-        values |= {UNITS: FIRST_UNITS, UNITS + 1: FIRST_UNITS, SLOPE: 0.0, TRIES: 0.0}
-        for vector, word in (values | {LEFT: _NO_LIMIT if most is None else float(most)}).items():
-            self.clock[LANES * vector + lane] = word
+        sources = [*rows[0][:3], *(rows[row][component] for row, component, _ in self.terms)]
+        words = numpy.transpose([split(value) for value in problem.state]).ravel()
+        self.begin(lane, words, numpy.array([split_constant(value) for value in sources]), forwards, most)
 
-    def put_all(self, words: Any, constants: Any, most: int) -> None:
-        """Eight motions at their beginning, forwards: their words (12, 8), and those of each constant (k, 3, 8)."""
-        self.words[:], self.constants[:] = words.reshape(-1), constants.reshape(-1)
-        self.flags[:], self.signs[:] = OK, [1] * LANES
-        values = {TIME: 0.0, TIME + 1: 0.0, SIGN: 1.0, LEFT: float(most)}
-        values |= {UNITS: FIRST_UNITS, UNITS + 1: FIRST_UNITS, SLOPE: 0.0, TRIES: 0.0}
-        for vector, value in values.items():
-            self._set(vector, value)
+    def begin(self, lanes: Any, words: Any, constants: Any, forwards: bool, most: int | None) -> None:
+        """Motions at their beginning in a lane, or in all: the words of their states, and of each constant."""
+        self.words[:, lanes], self.constants[:, :, lanes], self.flags[lanes] = words, constants, OK
+        self.clock[[TIME, TIME + 1, SLOPE, TRIES], lanes] = 0.0
+        self.clock[[UNITS, UNITS + 1], lanes] = FIRST_UNITS
+        self.clock[SIGN, lanes] = 1.0 if forwards else -1.0
+        self.clock[LEFT, lanes] = _NO_LIMIT if most is None else most
 
-    def aim_all(self, targets: Any) -> None:
-        """Where the lanes are to stop, |τ|, eight doubles."""
-        self._set(TARGET, targets)
-        self._set(TARGET + 1, 0.0)
-
-    def sample_all(self, targets: Any) -> Doubles:
-        """The states of eight motions forwards at doubles |τ| inside their next steps: (12, 8)."""
-        behind, sampled = self.behind, self.sampled
-        first, second = self.clock[:LANES], self.clock[LANES : 2 * LANES]
-        total = targets - first
+    def reach_all(self, targets: Any) -> Doubles:
+        """The states of eight motions forwards at doubles |τ|, each at its own, not before the last: (12, 8)."""
+        self.clock[TARGET] = targets
+        while self.advance(_ROUNDS) == _ROUNDS:
+            pass
+        total = targets - self.clock[TIME]
         part = total - targets
-        low = ((targets - (total - part)) - (first + part)) - second
-        behind[:LANES] = total + low
-        behind[LANES:] = low - (behind[:LANES] - total)
-        self.functions["sample"](self.tables[2], self.schedule.order, *self.sampling)
-        return sampled.reshape(12, LANES).copy()
+        low = ((targets - (total - part)) - (self.clock[TIME] + part)) - self.clock[TIME + 1]
+        self.behind[0] = total + low
+        self.behind[1] = low - (self.behind[0] - total)
+        return self._sample()
 
-    def left_all(self) -> Doubles:
-        """The steps that each lane may still take."""
-        return self.clock[LANES * LEFT : LANES * (LEFT + 1)]
+    def _sample(self) -> Doubles:
+        """The states of all lanes so far behind the beginnings of their next steps."""
+        self.functions["sample"](self.tables[2], self.schedule.order, *self.sampling)
+        return self.sampled
 
     def taken_out(self, lane: int) -> tuple[Doubles, Doubles]:
         """All that a motion needs to go on in another eight: its state, and its part of the clock."""
-        return self.words[lane::LANES].copy(), self.clock[lane::LANES].copy()
+        return self.words[:, lane].copy(), self.clock[:, lane].copy()
 
     def put_back(self, lane: int, problem: Scaled, forwards: bool, moved: tuple[Doubles, Doubles]) -> None:
         """A motion that was taken out of another eight."""
         self.put(lane, problem, forwards, None)
-        self.words[lane::LANES], self.clock[lane::LANES] = moved
-        self.clock[LANES * TRIES + lane] = 0.0
+        self.words[:, lane], self.clock[:, lane] = moved
+        self.clock[TRIES, lane] = 0.0
 
     def empty(self, lane: int) -> None:
         """Nothing in this lane: it takes no steps."""
-        self.clock[LANES * LEFT + lane] = 0.0
+        self.clock[LEFT, lane] = 0.0
 
     def aim(self, lane: int, target: Fraction) -> None:
         """Where this lane is to stop, |τ|."""
-        words = split(min(target, LARGEST_TIME))
-        for k in range(2):
-            self.clock[LANES * (TARGET + k) + lane] = words[k]
+        self.clock[TARGET : TARGET + 2, lane] = split(min(target, LARGEST_TIME))
 
     def advance(self, rounds: int) -> int:
         """Steps of all lanes that can go, at most so many; gives the rounds after which none could."""
@@ -367,11 +338,11 @@ class Eight:
 
     def time(self, lane: int) -> Fraction:
         """|τ| of the last step end of a lane."""
-        return sum((Fraction(float(self.clock[LANES * (TIME + k) + lane])) for k in range(2)), Fraction(0))
+        return Fraction(self.clock[TIME, lane]) + Fraction(self.clock[TIME + 1, lane])
 
     def taken(self, lane: int, most: int | None) -> int:
         """Steps of the motion in a lane, which might take ``most``."""
-        return int((_NO_LIMIT if most is None else most) - self.clock[LANES * LEFT + lane])
+        return int((_NO_LIMIT if most is None else most) - self.clock[LEFT, lane])
 
     def status(self, lane: int) -> Status | None:
         """Whether the motion in a lane can go on; None where it needs a larger n0."""
@@ -384,26 +355,25 @@ class Eight:
 
     def coefficients(self, lane: int, n: int) -> tuple[Fraction, ...]:
         """y_n of a lane's last series."""
-        tables = [self.scratch[offset + ROW * n : offset + ROW * (n + 1)] for offset in (0, LOW)]
-        return exact_state(numpy.concatenate(tables)[lane::LANES])
+        words = [self.scratch[offset + ROW * n + lane : offset + ROW * (n + 1) : LANES] for offset in (0, LOW)]
+        return exact_state(numpy.concatenate(words))
 
     def state(self, lane: int) -> tuple[Fraction, ...]:
         """Where a lane's motion is."""
-        return exact_state(self.words[lane::LANES])
+        return exact_state(self.words[:, lane])
 
     def samples(self, times: dict[int, Fraction]) -> dict[int, Doubles]:
         """The states of some lanes, each at a time |τ| inside its next step: high words, then low ones, shape (12,)."""
-        behind, samples = doubles(2 * LANES), doubles(12 * LANES)
         for lane, time in times.items():
-            behind[lane], behind[LANES + lane] = self._behind(lane, time)
-        self.functions["sample"](self.tables[2], self.schedule.order, pointer(behind), pointer(samples))
-        return {lane: samples[lane::LANES] for lane in times}
+            self.behind[:, lane] = self._behind(lane, time)
+        samples = self._sample()
+        return {lane: samples[:, lane].copy() for lane in times}
 
     def _behind(self, lane: int, time: Fraction) -> tuple[float, float]:
         """τ of a time |τ| after the beginning of a lane's next step."""
-        (a, b), (c, d) = (float(self.clock[LANES * (TIME + k) + lane]).as_integer_ratio() for k in range(2))
+        (a, b), (c, d) = (word.as_integer_ratio() for word in self.clock[TIME : TIME + 2, lane].tolist())
         top, bottom = time.as_integer_ratio()
-        return split_ratio(self.signs[lane] * (top * b * d - bottom * (a * d + c * b)), bottom * b * d)
+        return split_ratio(int(self.clock[SIGN, lane]) * (top * b * d - bottom * (a * d + c * b)), bottom * b * d)
 
 
 def exact_state(words: Doubles) -> tuple[Fraction, ...]:

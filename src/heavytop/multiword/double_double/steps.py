@@ -11,7 +11,6 @@ The step is h = ρ exp(reach), with the radius ρ from the last two coefficients
 
 from __future__ import annotations
 
-import ctypes
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,10 +18,8 @@ from typing import Any
 
 from heavytop.multiword.codegen.machine_code import (
     DOUBLE,
-    DOUBLES,
     INT,
     INT_POINTER,
-    INTEGERS,
     POINTER,
     Code,
     Following,
@@ -146,9 +143,9 @@ def quotient(code: Code, first: Pair | None, factors: list[tuple[Constant, Pair]
             high, lost = code.two_sum(total[0], product)
             total = high, total[1] + (rest + lost)
     assert total is not None
-    whole, inverse = divisor
+    integer, inverse = divisor
     quotient = total[0] * inverse
-    rest = code.fma(-quotient, whole, total[0]) + total[1]
+    rest = code.fma(-quotient, integer, total[0]) + total[1]
     return code.quick_two_sum(quotient, rest * inverse)
 
 
@@ -299,11 +296,11 @@ class SplitOrders:
 
     def _added(self, one: list[Operand], other: list[Operand], sums: list[Operand]) -> list[Operand]:
         """Three sums of each vector, with the products of L of one order and R of another."""
-        whole, coarse, fine = other[:3]
+        unsplit, coarse, fine = other[:3]
         result = []
         for v in self.series.vectors:
             a, rest = one[3 + 2 * v : 5 + 2 * v]
-            for left, right, total in zip((a, a, rest), (coarse, fine, whole), sums[3 * v : 3 * v + 3], strict=True):
+            for left, right, total in zip((a, a, rest), (coarse, fine, unsplit), sums[3 * v : 3 * v + 3], strict=True):
                 result.append(self.series.code.fma(left, right, total))
         return result
 
@@ -353,16 +350,7 @@ def build(system: System, attitude: bool, processor: Processor | None = None) ->
     advance.write()
     _write_sample(module, layout, system)
     _Follow(module, layout, system).write(advance.made)
-    integer, double = ctypes.c_int64, ctypes.c_double
-    return compiled(
-        module,
-        {
-            "advance": (integer, [DOUBLES, DOUBLES, INTEGERS, DOUBLES, DOUBLES, integer]),
-            "sample": (None, [DOUBLES, integer, integer, double, double, DOUBLES]),
-            "follow": (None, [*[DOUBLES] * 2, INTEGERS, *[DOUBLES] * 4, INTEGERS, integer, integer, DOUBLES]),
-        },
-        processor,
-    )
+    return compiled(module, processor)
 
 
 def _write_sample(module: ir.Module, layout: Layout, system: System) -> None:
@@ -394,16 +382,16 @@ class _Follow(Following):
     def __init__(self, module: ir.Module, layout: Layout, system: System) -> None:
         kinds = [POINTER, POINTER, INT_POINTER, *[POINTER] * 4, INT_POINTER, INT, INT, POINTER]
         _, code = function(module, "follow", ir.VoidType(), kinds)
-        super().__init__(code, code.arguments[:5], code.arguments[2], STATUS)
+        super().__init__(code, code.arguments[:5], code.arguments[1], code.arguments[2], STATUS)
         self.times, self.layout = (code.arguments[5], code.arguments[6]), layout
         self.rows = Recurrence(code, layout, system, code.null, self.arrays[-1])
 
     def covered(self, index: Operand) -> Operand:
-        return covered((self._clock(TIME), self._clock(TIME_LOW)), self._target(index))
+        return covered((self.time(TIME), self.time(TIME_LOW)), self._target(index))
 
     def aim(self, index: Operand) -> None:
         for word, at in zip(self._target(index), (TARGET, TARGET_LOW), strict=True):
-            self.code.store_one(word, self.arrays[1], at)
+            self.code.store_one(word, self.clock, at)
 
     def put(self, done: Operand, head: Any, otherwise: Any) -> None:
         one = self.code.builder.append_basic_block("one")
@@ -416,11 +404,11 @@ class _Follow(Following):
         where one of these times takes exact numbers.
         """
         code, b = self.code, self.code.builder
-        began, put = (self._clock(BEGAN), self._clock(BEGAN_LOW)), b.append_basic_block("put")
+        began, put = (self.time(BEGAN), self.time(BEGAN_LOW)), b.append_basic_block("put")
         sure, times, end = code.true, [], done
         for k in range(count):
             index = code.smaller(done + k, self.times_count - 1)
-            at, known = behind(code, self._target(index), began, self._clock(SIGN))
+            at, known = behind(code, self._target(index), began, self.time(SIGN))
             is_covered = self.covered(index)
             sure &= known | ~is_covered
             end += is_covered.extended()
@@ -428,16 +416,13 @@ class _Follow(Following):
         b.cbranch(sure, put, otherwise)
         b.position_at_end(put)
         result = code.address(self.result, done * (16 * self.layout.vectors))
-        low_order, order = (code.load_one(self.arrays[2], offset) for offset in (USED, ORDER))
+        low_order, order = (code.load_one(self.counts, offset) for offset in (USED, ORDER))
         _put_samples(self.rows, (low_order, order), times, result)
         code.store_one(code.smaller(end, self.times_count), self.progress, 0)
         b.branch(head)
 
     def _target(self, index: Operand) -> Pair:
         return self.code.load_one(self.times[0], index), self.code.load_one(self.times[1], index)
-
-    def _clock(self, index: int) -> Operand:
-        return self.code.load_one(self.arrays[1], index)
 
 
 class _Step(Stepping):

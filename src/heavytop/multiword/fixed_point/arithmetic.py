@@ -18,7 +18,6 @@ are the same, and as exact (:attr:`Grid.relative`).
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -26,7 +25,6 @@ from fractions import Fraction
 import numpy
 
 from heavytop.multiword.codegen.machine_code import (
-    DOUBLES,
     INT,
     LANES,
     POINTER,
@@ -123,12 +121,12 @@ class Accumulator:
     sums: list[Operand]
     seen: Operand
 
-    def add_product(self, a: list[Operand], b: list[Operand], each: bool = False, below: bool = False) -> None:
+    def add_product(self, a: list[Operand], b: list[Operand], watched: bool = False, below: bool = False) -> None:
         """Add a b, of words numbered from 0 that count from level ``base`` on.
 
         What goes to the last level is added up before it gets there: its sum is what the next product waits for.
 
-        each: look at a sum after each of its products, not only where low parts are added to it.
+        watched: look at a sum after each of its products, not only where low parts are added to it.
         below: with the products of the level below the last, rounded.
         """
         code, last = self.code, len(self.sums) - 1
@@ -142,7 +140,7 @@ class Accumulator:
                 part = total - self.sums[k]
                 lows.append(code.fma(a[i], b[k - i], -part))
                 self.sums[k] = total
-                if k == 0 or each:
+                if k == 0 or watched:
                     self.look(k)
             low = in_pairs(lows)
             if k + 1 < last:
@@ -258,9 +256,9 @@ def write_long_kernel(module: ir.Module, grid: Grid, row: int) -> ir.Function:
                 return values
 
             groups = count // _UNROLLED
-            whole = groups * _UNROLLED
+            unrolled = groups * _UNROLLED
             values = code.loop(0, groups, lambda g, v: some(g * _UNROLLED, _UNROLLED, v), values)
-            return code.loop(whole, count, lambda i, v: some(i, 1, v), values)
+            return code.loop(unrolled, count, lambda i, v: some(i, 1, v), values)
 
         def exact_level(k: Operand, values: list[Operand]) -> list[Operand]:
             offset = k * LANES
@@ -370,19 +368,16 @@ def grid_for(bits: int) -> Grid | None:
 
 def digits(value: Fraction, grid: Grid) -> list[float]:
     """``value`` rounded to a multiple of the last unit, as words."""
-    top, bottom = value.as_integer_ratio()
-    whole, rest = divmod(top << grid.total, bottom)
-    whole += 2 * rest > bottom or (2 * rest == bottom and whole & 1)  # to nearest, a tie to even
-    return words_of(whole, grid)
+    return words_of(round(value * 2**grid.total), grid)
 
 
-def words_of(whole: int, grid: Grid) -> list[float]:
+def words_of(ulps: int, grid: Grid) -> list[float]:
     """So many of the last unit, as words."""
     words = []
     for k in range(grid.words):
         shift = grid.bits * (grid.words - 1 - k)
-        digit = (whole + (1 << shift >> 1)) >> shift if k < grid.words - 1 else whole
-        whole -= digit << shift
+        digit = (ulps + (1 << shift >> 1)) >> shift if k < grid.words - 1 else ulps
+        ulps -= digit << shift
         words.append(float(digit) * grid.unit(k))
     return words
 
@@ -446,7 +441,7 @@ def machine(grid: Grid, vectors: int) -> Machine:
 
     code.loop(0, orders + 1, order, [])
     code.builder.ret_void()
-    return compiled(module, {"extents": (None, [DOUBLES, ctypes.c_int64, *[DOUBLES] * 5])})
+    return compiled(module)
 
 
 def component(code: Code, left: Operand) -> Operand:

@@ -23,13 +23,12 @@ were 0 in several orders one after another.  The grid is one whose units are dou
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from math import ldexp
 from threading import local
-from typing import Any, cast
+from typing import cast
 
 import numpy
 
@@ -38,7 +37,6 @@ from heavytop.multiword.codegen.machine_code import (
     DOUBLES,
     INT,
     INT_POINTER,
-    INTEGERS,
     POINTER,
     Doubles,
     Integers,
@@ -180,18 +178,12 @@ def machine(grid: Grid, system: System, data: bool) -> Machine:
     """``column``, and for data ``gather`` and ``column_of_data``."""
     module = ir.Module("first_variation")
     kernels = WordRows.write_kernels(module, grid, WordRows.size(grid, 1, 1).row, False)
-    pointers = [DOUBLES] * 5 + [INTEGERS, DOUBLES]
-    integer = ctypes.c_int64
-    signature = [*pointers, ctypes.c_double, integer, DOUBLES, DOUBLES, INTEGERS, integer]
     _ColumnCode(module, grid, system, 1, False, of_data=False, kernels=kernels).write()
-    signatures: dict[str, tuple[Any, Sequence[Any]]] = {"column": (integer, signature)}
     if data:
         code = _ColumnCode(module, grid, system, 1, False, of_data=True, kernels=kernels)
         code.write()
         code.write_gather()
-        signatures["column_of_data"] = (integer, [*signature, DOUBLES, DOUBLES])
-        signatures["gather"] = (None, [DOUBLES, INTEGERS, DOUBLES, DOUBLES, integer, DOUBLES])
-    return compiled(module, signatures)
+    return compiled(module)
 
 
 @dataclass(frozen=True, slots=True)

@@ -238,10 +238,10 @@ class Fixed(ResumableRun):
         for index, value in enumerate(state_of_left(lanes)):
             components[:, :count, index] = value
         for v, words in enumerate(left):
-            whole, half = words[:, -1, 4:2:-1], words[:, -1, 5:6] / 2
-            total = whole - half
-            part = total - whole
-            components[:, -1, 3 + 3 * v : 6 + 3 * v : 2] = (whole - (total - part)) - (half + part)
+            high, half = words[:, -1, 4:2:-1], words[:, -1, 5:6] / 2
+            total = high - half
+            part = total - high
+            components[:, -1, 3 + 3 * v : 6 + 3 * v : 2] = (high - (total - part)) - (half + part)
         return components
 
     def exact_state(self, words: Doubles, time: Fraction) -> tuple[Fraction, ...] | None:
@@ -300,8 +300,8 @@ def state_of_left(lanes: Sequence[Any]) -> tuple[Any, ...]:
 
 def _nearest(value: int, shift: int) -> int:
     """value/2^shift rounded to nearest, a tie to even."""
-    whole, rest = value >> shift, value & (1 << shift) - 1
-    return whole + (2 * rest > 1 << shift or (2 * rest == 1 << shift and whole & 1))
+    quotient, rest = value >> shift, value & (1 << shift) - 1
+    return quotient + (2 * rest > 1 << shift or (2 * rest == 1 << shift and quotient & 1))
 
 
 def _not_before(target: Fraction) -> float:

@@ -8,18 +8,15 @@ coefficients and sum their products. The series ends where two coefficients in a
 
 from __future__ import annotations
 
-import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial, reduce
 from typing import Any
 
 from heavytop.multiword.codegen.machine_code import (
     DOUBLE,
-    DOUBLES,
     INT,
     INT_POINTER,
-    INTEGERS,
     POINTER,
     Code,
     Following,
@@ -202,7 +199,7 @@ class SeriesCode:
         gathered_bits = code.load(seen, 0).bits()
         result = Accumulator(code, grid, 0, centred(code, grid, grid.words), gathered_bits)
         for factors, source in self.sources(vector, gathered, y):
-            result.add_product(factors, source, each=True, below=not grid.whole)
+            result.add_product(factors, source, watched=True, below=not grid.whole)
         result.look_at_all()
         code.store(result.seen.of_bits(), seen, 0)
         return summed(code, grid, result.sums)
@@ -381,21 +378,13 @@ def build(
     """
     module = ir.Module("grid")
     series = SeriesCode(module, grid, system, 2 if attitude else 1, (processor or Processor.here()).wide)
-    made, integer = series.write(), ctypes.c_int64
-    pointers = [DOUBLES] * 5 + [INTEGERS, DOUBLES]
-    signatures: dict[str, tuple[Any, Sequence[Any]]] = {
-        "series": (integer, [*pointers, ctypes.c_double, integer, DOUBLES]),
-    }
+    made = series.write()
     if stepping and not grid.relative:
         advance = _Advance(module, grid, series.vectors, made)
         advance.write()
         samples = write_samples(module, grid, series.vectors)
         _Follow(module, grid, series.vectors, samples).write(advance.made)
-        signatures["advance"] = (integer, [*pointers, DOUBLES, DOUBLES, INTEGERS, integer])
-        signatures["samples"] = (None, [DOUBLES, integer, DOUBLES, integer, integer, DOUBLES])
-        follow = [*pointers, *[DOUBLES] * 2, INTEGERS, *[DOUBLES] * 2, INTEGERS, integer, integer, DOUBLES]
-        signatures["follow"] = (None, follow)
-    return compiled(module, signatures, processor)
+    return compiled(module, processor)
 
 
 class _Advance(Stepping):
@@ -460,15 +449,15 @@ class _Follow(Following):
         arrays = [*[POINTER] * 5, INT_POINTER, *[POINTER] * 3, INT_POINTER]
         kinds = [*arrays, POINTER, POINTER, INT_POINTER, INT, INT, POINTER]
         _, code = function(module, "follow", ir.VoidType(), kinds)
-        super().__init__(code, code.arguments[:10], code.arguments[9], STATUS)
+        super().__init__(code, code.arguments[:10], code.arguments[8], code.arguments[9], STATUS)
         self.grid, self.row, self.samples = grid, sample_row(grid, vectors), samples
         self.times, self.at = code.arguments[10:12]
 
     def covered(self, index: Operand) -> Operand:
-        return self.code.load_one(self.times, index) <= self._clock(TIME)
+        return self.code.load_one(self.times, index) <= self.time(TIME)
 
     def aim(self, index: Operand) -> None:
-        self.code.store_one(self.code.load_one(self.times, index), self.arrays[8], TARGET)
+        self.code.store_one(self.code.load_one(self.times, index), self.clock, TARGET)
 
     def put(self, done: Operand, head: Any, otherwise: Any) -> None:
         code = self.code
@@ -497,7 +486,7 @@ class _Follow(Following):
         time − began is exact where began is 0, or no more than time ≤ 2 began (Sterbenz); a step is a power of two.
         """
         code, grid = self.code, self.grid
-        time, began, end = code.load_one(self.times, index), self._clock(BEGAN), self._clock(TIME)
+        time, began, end = code.load_one(self.times, index), self.time(BEGAN), self.time(TIME)
         rest = (time - began) / (end - began)
         near = time <= began + began
         known = (time <= end) & (near | (began == 0))
@@ -515,9 +504,6 @@ class _Follow(Following):
         row = self.code.address(self.result, index * self.row)
         largest = self.code.load(row, self.row - 8)
         return self.code.all_of(largest <= most_of(self.grid))
-
-    def _clock(self, index: int) -> Operand:
-        return self.code.load_one(self.arrays[8], index)
 
 
 def raises_of(exponent: int) -> tuple[float, int]:

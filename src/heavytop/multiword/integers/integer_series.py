@@ -99,9 +99,9 @@ class _Series:
             last = [component[n] for component in y]
             for component, row, known in zip(y, self.motion.rows, self.between, strict=True):
                 linear = sum((c * last[j] for c, j in row.linear), mpz(0))
-                whole = sum((c * sums[pair] for c, pair in row.products), known[n] + (linear << self.precision))
+                numerator = sum((c * sums[pair] for c, pair in row.products), known[n] + (linear << self.precision))
                 divisor = mpz(row.denominator * (n + 1)) << self.shift
-                component.append((2 * whole + divisor) // (2 * divisor))
+                component.append((2 * numerator + divisor) // (2 * divisor))
             if n > 2 and all(-2 <= component[i] <= 2 for component in y for i in (-1, -2)):
                 self.settled = True
                 return

@@ -102,6 +102,8 @@ def compare(
     timed = _timed(policy, baseline.environment, candidate.environment)
     repeated = _alike(baseline.environment, candidate.environment)
     checked = isinstance(baseline, Brief), isinstance(candidate, Brief)
+    if isinstance(baseline, Brief) and isinstance(candidate, Brief):
+        candidate.rows.twins = baseline.rows
     rows = RowComparison(policy, kinds, timed, list_same, checked, repeated)
     others = _Others(candidate.rows)
     for row in baseline.rows:

@@ -164,7 +164,7 @@ def load(path: Path) -> Policy:
     except InputError as error:
         raise InputError(f"The policy {path} is not valid: {error.cause}", error.remedy) from None
     except (tomllib.TOMLDecodeError, msgspec.ValidationError, RecursionError) as error:
-        raise InputError(f"The policy {path} is not valid: {invalid(error)}.", _REMEDY) from None
+        raise InputError(f"The policy {path} is not valid: {invalid(error, Policy)}.", _REMEDY) from None
 
 
 def adjusted(policy: Policy, floor: str | None = None, loss_bits: str | None = None) -> Policy:

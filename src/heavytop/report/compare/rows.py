@@ -6,6 +6,9 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import lru_cache
+from itertools import chain
+from operator import sub
 from statistics import median
 from typing import Any, Literal
 
@@ -64,7 +67,7 @@ from heavytop.report.store.checks import (
     inconsistent,
     interval_of,
     law_text,
-    log_size,
+    log_sizes,
     other_data,
     other_request,
 )
@@ -102,6 +105,8 @@ def judge_law(old: Law, new: Law, noise: float = 0.0, rerun: bool = False) -> Ju
     for law in (old, new):
         if problem := inconsistent(law):
             return Verdict.INCOMPARABLE, problem
+    if old == new:
+        return SAME
     if old.growth != new.growth:
         if "unresolved" not in (old.growth, new.growth) and not (rerun and _between_classes(old, new)):
             worse = _GROWTH.index(new.growth) > _GROWTH.index(old.growth)
@@ -193,6 +198,7 @@ def _power_of_law(old: Law, new: Law, noise: float) -> Judged | None:
 
 
 _NO_NUMBER = (NAN, MISSING)
+_WORDS = frozenset((*_NO_NUMBER, UNRESOLVED))
 _LOST_SHARE = 10
 """One in so many samples, and two, may no longer be resolved."""
 
@@ -205,23 +211,29 @@ def judge_series(old: Series, new: Series, allowed: float, floor: float, exactly
     """
     if old.times != new.times and list(map(exact, old.times)) != list(map(exact, new.times)):
         return Verdict.INCOMPARABLE, "other times"
-    pairs = list(zip(old.values, new.values, strict=True))
-    if any(b == NAN and a not in _NO_NUMBER for a, b in pairs):
-        return Verdict.WORSE, "a value is no longer a number"
-    if any(b == MISSING and a not in _NO_NUMBER for a, b in pairs):
-        return Verdict.INCOMPARABLE, "a value is no longer measured"
-    lost = sum(b == UNRESOLVED != a for a, b in pairs)
-    if lost > 2 + len(pairs) / _LOST_SHARE:
-        return Verdict.INCOMPARABLE, f"{lost} values are no longer resolved"
-    numbers = [pair for pair in pairs if not {*pair} & {*_NO_NUMBER, UNRESOLVED}]
-    if not numbers:
+    before, after = old.values, new.values
+    if not (_WORDS.isdisjoint(before) and _WORDS.isdisjoint(after)):
+        pairs = list(zip(before, after, strict=True))
+        if any(b == NAN and a not in _NO_NUMBER for a, b in pairs):
+            return Verdict.WORSE, "a value is no longer a number"
+        if any(b == MISSING and a not in _NO_NUMBER for a, b in pairs):
+            return Verdict.INCOMPARABLE, "a value is no longer measured"
+        lost = sum(b == UNRESOLVED != a for a, b in pairs)
+        if lost > 2 + len(pairs) / _LOST_SHARE:
+            return Verdict.INCOMPARABLE, f"{lost} values are no longer resolved"
+        numbers = [pair for pair in pairs if _WORDS.isdisjoint(pair)]
+        before, after = ([pair[side] for pair in numbers] for side in (0, 1))
+    if not before:
         return SAME
     if exactly:
-        values = [(exact(a), exact(b)) for a, b in numbers]
+        values = list(zip(map(exact, before), map(exact, after), strict=True))
         most = Fraction(allowed) * max(abs(a) for a, _ in values)
         off = any(abs(b - a) > most for a, b in values)
         return (Verdict.WORSE, "a value that must agree does not") if off else SAME
-    grown = median(max(log_size(b), floor) - max(log_size(a), floor) for a, b in numbers)
+    sizes = [log_sizes(texts) for texts in (before, after)]
+    if min(map(min, sizes)) < floor:
+        sizes = [[max(size, floor) for size in part] for part in sizes]
+    grown = median(map(sub, sizes[1], sizes[0]))
     return (Verdict.WORSE, f"{grown / BITS:.1f} bits lost at half of the samples") if grown > allowed else SAME
 
 
@@ -306,6 +318,7 @@ class RowComparison:
 
     def __post_init__(self) -> None:
         self.lookup = Lookup(self.policy)
+        self._bound: RoundingBound | None = None
 
     def ignores(self, row: Row) -> bool:
         """Whether a rule leaves out the row as a whole: one whose pattern takes every metric."""
@@ -411,7 +424,7 @@ class RowComparison:
             return SAME  # both stopped before there was one
         least_of = least(old.metrics, metric), least(new.metrics, match)
         kind = kind_of(old, self.kinds)
-        bound = RoundingBound(old, kind) if (metric.band or match.band) and kind.noise_is_reruns(metric) else None
+        bound = self._bound_of(old) if (metric.band or match.band) and kind.noise_is_reruns(metric) else None
         known, banded = of_starts(metric, old), of_starts(match, new)
         truncated = self._is_truncation(metric, match, old, new)
         assumed = 0.0 if truncated else kind.assumed_band(old.key.subject)
@@ -436,6 +449,7 @@ class RowComparison:
         return judged
 
     def _laws(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
+        summed = _by_series(old)
         for name in dict.fromkeys((*old.laws, *new.laws)):
             limits = self.limits(old, f"growth {name}")
             if limits.ignore:
@@ -447,7 +461,7 @@ class RowComparison:
             else:
                 # the same series again has the same roundings, so that another law of it is not chance
                 rerun = name in old.series and name in new.series and old.series[name] != new.series[name]
-                judged = judge_law(a, b, self._noise(name, old, limits), rerun)
+                judged = judge_law(a, b, self._noise(summed.get(name, {}), old, limits), rerun)
                 if judged[0] is Verdict.SAME and a.quantity != b.quantity:
                     judged = _ANOTHER
             before, after = (None if law is None else law_text(law) for law in (a, b))
@@ -455,6 +469,9 @@ class RowComparison:
 
     def _series(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
         """Findings of series that changed: an equal one is not a finding."""
+        if old.series is new.series:
+            return
+        summed = _by_series(old), _by_series(new)
         for name, series in old.series.items():
             limits = self.limits(old, f"series {name}")
             match = new.series.get(name)
@@ -464,11 +481,15 @@ class RowComparison:
                 before = f"{len(series.values)} samples kept"
                 yield Finding(key, name, Verdict.MISSING, before, None, "it is missing", "series")
                 continue
-            exactly = any(metric.kind == "value" for metric in _of_series(name, old, "max", "final"))
-            allowed = limits.value if exactly else max(limits.loss, self._noise(name, old, limits))
-            if not exactly and limits.noise and self._is_series_by_rounding(name, old, new):
-                allowed = math.inf
-            judged = judge_series(series, match, allowed, limits.floor + self._eps(series.quantity, old), exactly)
+            metrics, matches = (by_name.get(name, {}) for by_name in summed)
+            exactly = any(metric.kind == "value" for part in ("max", "final") for metric in metrics.get(part, ()))
+            allowed = limits.value if exactly else max(limits.loss, self._noise(metrics, old, limits))
+            floor = limits.floor + self._eps(series.quantity, old)
+            judged = judge_series(series, match, allowed, floor, exactly)
+            if judged[0] is Verdict.WORSE and not exactly and limits.noise:
+                largest = list(zip(metrics.get("max", ()), matches.get("max", ()), strict=False))
+                if largest and all(self._is_by_rounding(*pair, old) for pair in largest):
+                    judged = judge_series(series, match, math.inf, floor, exactly)
             if judged[0] is Verdict.SAME and series.quantity != match.quantity:
                 judged = _ANOTHER
             if judged[0] is not Verdict.SAME:
@@ -557,7 +578,7 @@ class RowComparison:
             return False
         kind = kind_of(old, self.kinds)
         largest = max(size(metric), size(match))
-        return kind.noise_is_reruns(metric) and RoundingBound(old, kind).explains(metric.quantity, largest)
+        return kind.noise_is_reruns(metric) and self._bound_of(old).explains(metric.quantity, largest)
 
     def _is_truncation(self, metric: Metric, match: Metric, old: Row, new: Row) -> bool:
         """Whether two errors differ by truncation: of the same steps, further apart than roundings bring them.
@@ -575,7 +596,13 @@ class RowComparison:
         if not (reruns or kind.assumed_band(subject)):
             return False
         low, high = sorted((metric.log10, match.log10))
-        return not RoundingBound(old, kind).explains(metric.quantity, apart(low, high - low))
+        return not self._bound_of(old).explains(metric.quantity, apart(low, high - low))
+
+    def _bound_of(self, row: Row) -> RoundingBound:
+        """The rounding bound of a row, whose rate and amplification its metrics share."""
+        if self._bound is None or self._bound.row is not row:
+            self._bound = RoundingBound(row, kind_of(row, self.kinds))
+        return self._bound
 
     def _is_slight(self, metric: Metric, match: Metric, limits: Limits, old: Row, new: Row) -> bool:
         """Whether a loss counts as one of truncation alone."""
@@ -583,15 +610,10 @@ class RowComparison:
         allowed = lost <= limits.loss and beyond_limit(match, limits) is None
         return allowed and lost > limits.truncation and self._is_truncation(metric, match, old, new)
 
-    def _is_series_by_rounding(self, name: str, old: Row, new: Row) -> bool:
-        """Whether roundings alone make the largest values of a series."""
-        pairs = zip(_of_series(name, old, "max"), _of_series(name, new, "max"), strict=False)
-        explained = [self._is_by_rounding(metric, match, old) for metric, match in pairs]
-        return bool(explained) and all(explained)
-
-    def _noise(self, name: str, row: Row, limits: Limits) -> float:
-        """Decades by which noise may move what a series or a law is about: as the metrics of its quantity."""
-        bands = [of_starts(metric, row) for metric in _of_series(name, row, "final", "rms", "max") if metric.band]
+    def _noise(self, metrics: dict[str, list[Metric]], row: Row, limits: Limits) -> float:
+        """Decades by which noise may move what a series or a law is about: as the metrics that sum it up."""
+        parts = (metrics.get(part, ()) for part in ("final", "rms", "max"))
+        bands = [of_starts(metric, row) for metric in chain.from_iterable(parts) if metric.band]
         widest = max((allowed_loss(metric, metric) for metric in bands), default=0.0)
         return limits.noise * max(widest, kind_of(row, self.kinds).assumed_band(row.key.subject))
 
@@ -610,7 +632,16 @@ def _samples(row: Row) -> int:
     return row.samples or max((len(series.times) for series in row.series.values()), default=0)
 
 
-def _of_series(name: str, row: Row, *statistics: str) -> list[Metric]:
-    """The metrics of a row that sum up its series of that name."""
-    pairs = ((metric.quantity, metric) for metric in row.metrics.values())
-    return [metric for q, metric in pairs if q and q.statistic in statistics and q.over("").text == name]
+def _by_series(row: Row) -> dict[str, dict[str, list[Metric]]]:
+    """The metrics of a row by the name of the series that they sum up, and by their statistic."""
+    by_name: dict[str, dict[str, list[Metric]]] = {}
+    for metric in row.metrics.values():
+        if (quantity := metric.quantity) is not None:
+            by_name.setdefault(_series_key(quantity), {}).setdefault(quantity.statistic, []).append(metric)
+    return by_name
+
+
+@lru_cache(1 << 12)
+def _series_key(quantity: Quantity) -> str:
+    """The key of the series that a quantity sums up."""
+    return quantity.over("").text

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import Enum
 from fractions import Fraction
+from functools import lru_cache
 
 from heavytop.errors import InputError
 from heavytop.measure.scalar import RESOLVED_RADII, UNRESOLVED
@@ -371,6 +372,7 @@ def _kind(reference: Against) -> str:
     )
 
 
+@lru_cache(1 << 12)
 def log_of(text: str | None) -> float:
     """log10 |number|, 0 without one, -inf for 0; nan for what is not a number, which is within no bound."""
     try:

@@ -46,6 +46,7 @@ from heavytop.report.document.svg import (
     spoken,
 )
 from heavytop.report.render.page import digits_until, sections
+from heavytop.report.render.text import COMPUTED
 
 _GREY = 5
 _FITTED = Key("fitted law", _GREY, "", "6 3")
@@ -265,12 +266,14 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
             "Digits right at every sample up to a time: −log10 of the largest |error|/max(1, |true value|) of a "
             "component of Ω or γ, compared with the reference; of many starts the root mean square. A bar is the "
             "interval in which rounding noise alone moves it; dashed: all digits of the format. × is a run that "
-            "failed, or whose error is not available.",
+            "failed, or whose error is not available; the line from a dot leads to its label alone.",
         ],
         columns=["case", "format", "T", "samples", "digits right", "of digits", "± digits"],
         across=2,
         place=10,
     )
+    if any(row.reference.how == "computed" for _, row in runs):
+        section.notes.append(COMPUTED)
     wanted = set(first)
     lanes: dict[str, list[_Run]] = {}
     for source, row in sorted(runs, key=lambda run: (bool(run[1].key.subject.variant), run[1].case not in wanted)):

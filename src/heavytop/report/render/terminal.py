@@ -15,7 +15,7 @@ from rich.text import Text
 from heavytop.display import plural, printable
 from heavytop.measure.scalar import digits_kept, digits_text
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR
-from heavytop.records import HEYOKA, MULTIWORD, UNMEASURED, Quantity, Report, Row, Series
+from heavytop.records import HEYOKA, MULTIWORD, UNMEASURED, UNSUPPORTED, Quantity, Report, Row, Series
 from heavytop.report.compare.verdicts import size
 from heavytop.report.document.document import Block, Card, Chart, Headline, In, Note, Table, Word, points, short
 from heavytop.report.document.kind import Kinds, document, headlines
@@ -109,16 +109,18 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
     first = list(islice(stream, MOST_ROWS + 1))
     failures: list[str] = []
     answers: list[Block] = []
-    number = bad = 0
+    number = bad = aborted = 0
 
     def seen(rows: Iterable[Row]) -> Iterable[Row]:
-        nonlocal number, bad
+        nonlocal number, bad, aborted
         for row in rows:
             number += 1
             if failed(row, kinds):
                 bad += 1
                 if len(failures) < _MOST_FAILURES:
                     failures.append(failure(row).strip())
+            elif row.outcome not in ("success", UNSUPPORTED):
+                aborted += 1
             yield row
 
     if len(first) <= MOST_ROWS:
@@ -131,7 +133,7 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
     else:
         parts = [_counted(seen(chain(first, stream)))]
     head = f"Plan {report.plan.get('name', '?')}: {plural(number, 'measurement')}, "
-    head += f"{bad} failed:" if bad else "all finished."
+    head += f"{bad} failed:" if bad else f"{aborted} aborted." if aborted else "all finished."
     if bad > len(failures):
         failures[-1:] = [f"and {bad - len(failures) + 1} more"]
     lines = [head, *(line for failure in failures for line in wrapped(f"  {failure}", "    ")[:_MOST_OF_ONE])]

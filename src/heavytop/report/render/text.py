@@ -36,7 +36,7 @@ def largest_over(rows: Iterable[Row]) -> str:
 
 DIGITS = "Digits right: −log10 of the largest |error|/max(1, |true value|) of a component of Ω or γ."
 NOISE_BAND = "± is the rounding noise in decades: half its 95 % interval; none: below 0.01 or not measured."
-COMPUTED = "*, lost a–b (all digits, between samples a and b): reference not proven."
+COMPUTED = "lost a–b: all digits are lost between these times; that and *: reference computed."
 
 
 def failed(row: Row, kinds: Kinds) -> bool:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from fractions import Fraction
+from functools import lru_cache
 from math import isfinite
 from pathlib import Path
 
@@ -59,6 +60,7 @@ def other_request(old: Row, new: Row) -> str:
     return ""
 
 
+@lru_cache(1 << 14)
 def impossible(data: Data, starts: int) -> str:
     """Data of a row of so many starts that no run writes, in words; empty without any."""
     for name in _VECTORS:
@@ -91,7 +93,8 @@ def _text(texts: str | tuple[str, ...]) -> str:
 CLOSE = 1e-5
 """Decades: how far two logarithms of the same number may be apart, for numbers have six digits at least."""
 _SUCCESS = Outcome.SUCCESS.value
-_NO_NUMBER = ("nan", "missing")
+_NOT_FINITE = frozenset(("nan", "missing"))
+_NOT_NUMBERS = _NOT_FINITE | {UNRESOLVED, "never"}
 
 _HALF_WAY = 0.25 - NEAR
 """Half of an interval that holds one class and no other, wherever it is: what is known of an exponent without one."""
@@ -125,9 +128,16 @@ def _reached(row: Row) -> Iterator[str]:
     failed = row.metrics.get("starts_failed")
     if failed is not None and failed.value != "0":
         yield f"starts_failed: a success with {failed.value} starts that failed"
-    with suppress(InputError):  # what is evaluated exactly has no format, and a law has several
-        if parse(row.precision).bits != row.bits:
-            yield f"bits: {row.bits} in {row.precision}"
+    if _bits(row.precision) not in (None, row.bits):
+        yield f"bits: {row.bits} in {row.precision}"
+
+
+@lru_cache
+def _bits(precision: str) -> int | None:
+    """The bits of a format; None of the precision of a row that has none, or several."""
+    with suppress(InputError):
+        return parse(precision).bits
+    return None
 
 
 def _sizes(metrics: Mapping[str, Metric]) -> Iterator[str]:
@@ -135,10 +145,17 @@ def _sizes(metrics: Mapping[str, Metric]) -> Iterator[str]:
     for metric in metrics.values():
         quantity = metric.quantity
         if quantity is not None and metric.log10 is not None and quantity.statistic == "max":
-            for part in ("rms", "final"):
-                other = metrics.get(quantity.over(part).text)
+            for name in _keys(quantity)[1:]:
+                other = metrics.get(name)
                 if other is not None and other.log10 is not None and other.log10 > metric.log10 + CLOSE:
-                    yield f"{quantity.over(part).text}: larger than the largest"
+                    yield f"{name}: larger than the largest"
+
+
+@lru_cache(1 << 12)
+def _keys(quantity: Quantity) -> tuple[str, str, str]:
+    """The keys of the largest value of a quantity, of its root mean square and of its last value."""
+    largest, rms, last = (quantity.over(statistic).text for statistic in ("max", "rms", "final"))
+    return largest, rms, last
 
 
 def _series(row: Row, kind: ReportedKind) -> Iterator[str]:
@@ -148,24 +165,29 @@ def _series(row: Row, kind: ReportedKind) -> Iterator[str]:
         if len(series.times) != len(series.values):
             yield f"{name}: not one value for each time"
             continue
-        if row.finite and any(value in _NO_NUMBER for value in series.values):
+        if row.finite and not _NOT_FINITE.isdisjoint(series.values):
             yield f"finite: said to be finite, but {name} holds nan or missing"
         if series.quantity is not None and not kind.series_has_more(series.quantity):
             yield from _against_metrics(series.quantity, series, row)
 
 
 def _against_metrics(quantity: Quantity, series: Series, row: Row) -> Iterator[str]:
-    values = sizes(series)
-    largest, last = (row.metrics.get(quantity.over(part).text) for part in ("max", "final"))
-    if largest is not None and values and max(values) > bound(largest) + CLOSE:
-        yield f"{quantity.text}: the series is larger than {quantity.over('max').text}"
+    of_largest, _, of_last = _keys(quantity)
+    largest, last = row.metrics.get(of_largest), row.metrics.get(of_last)
+    if largest is not None and (size := peak(series)) is not None and size > bound(largest) + CLOSE:
+        yield f"{quantity.text}: the series is larger than {of_largest}"
     if last is not None and ended(series, row):
-        yield from _last(quantity.over("final").text, series.values[-1], last)
+        yield from _last(of_last, series.values[-1], last)
 
 
-def sizes(series: Series) -> list[float]:
-    """log10 of the values of a series that are numbers, -1e9 for 0."""
-    return [size for value in series.values if (size := size_of(value)) is not None]
+def peak(series: Series) -> float | None:
+    """log10 of the largest size among the values of a series, -1e9 for 0; None where none is a number."""
+    numbers = series.values if _NOT_NUMBERS.isdisjoint(series.values) else list(filter(is_number, series.values))
+    with suppress(ValueError):
+        sizes = list(map(abs, map(float, numbers)))
+        if 1e-300 < sum(sizes) < 1e300:
+            return math.log10(max(sizes))
+    return max(map(log_size, numbers), default=None)
 
 
 def ended(series: Series, row: Row) -> bool:
@@ -187,9 +209,21 @@ def _floor(size: float | None) -> float:
 
 def size_of(value: str) -> float | None:
     """log10 of a value of a series, -1e9 for 0; None for a word."""
-    if value in (*_NO_NUMBER, UNRESOLVED, "never"):
-        return None
-    return log_size(value)
+    return log_size(value) if is_number(value) else None
+
+
+def is_number(value: str) -> bool:
+    """Whether a value of a series is no word."""
+    return value not in _NOT_NUMBERS
+
+
+def log_sizes(texts: Sequence[str]) -> list[float]:
+    """:func:`log_size` of each number."""
+    with suppress(ValueError):
+        sizes = list(map(abs, map(float, texts)))
+        if 1e-300 < min(sizes) <= sum(sizes) < 1e300:
+            return list(map(math.log10, sizes))
+    return list(map(log_size, texts))
 
 
 def log_size(text: str) -> float:
@@ -218,6 +252,7 @@ def law_text(law: Law) -> str:
     return f"{law.growth}, exponent {law.exponent:.3g}{span}"
 
 
+@lru_cache(1 << 12)
 def inconsistent(law: Law) -> str:
     """Why a law contradicts itself: class, exponent, intervals and span; empty where it does not."""
     if (law.low is None) != (law.high is None) or (law.exponent is None and law.low is not None):
@@ -261,38 +296,113 @@ def check_keys(file: Path | str, rows: Iterable[Row]) -> None:
 
 def check_rows(file: Path, rows: Sequence[Row], kinds: Kinds) -> None:
     """Raises InputError where a row cannot be, or contradicts itself, naming it and its field."""
+    doubtful = _doubtful([metric for row in rows for metric in row.metrics.values()])
     for row in rows:
-        _check_row(file, row, kind_of(row, kinds))
-    metrics = [metric for row in rows for metric in row.metrics.values()]
-    if doubtful := _doubtful(metrics):
-        for row in rows:
-            for name, metric in row.metrics.items():
-                if id(metric) in doubtful:
-                    _check_metric(f"{_where(file, row)}, {printable(name)[:60]}", metric, row.finite)
-    _check_series(file, rows)
+        _refuse_first(file, row, _problems(row, kind_of(row, kinds), doubtful))
+
+
+def check_seconds(file: Path, rows: Iterable[Row], kinds: Kinds) -> None:
+    """Raises InputError where seconds contradict a row of which all else is checked: only kinds look at them."""
     for row in rows:
-        for problem in contradictions(row, kind_of(row, kinds)):
-            raise InputError(f"{_where(file, row)}, {printable(problem)[:260]}.", REMEDY)
+        _refuse_first(file, row, kind_of(row, kinds).contradictions(row) if row.outcome == _SUCCESS else ())
 
 
-def _check_series(file: Path, rows: Iterable[Row]) -> None:
-    """Raises InputError where the values of a series are not as many as its times, or a text that is not a number."""
-    for row in rows:
-        for name, series in row.series.items():
-            if len(series.times) != len(series.values):
-                raise InputError(f"{_where(file, row)}, {printable(name)[:60]}: not one value for each time.", REMEDY)
-            if not all(map(isfinite, _floats([*series.times, *series.values]))):
-                for text in (*series.times, *(value for value in series.values if value not in WORDS["value"])):
-                    _number(f"{_where(file, row)}, {printable(name)[:60]}", text)
+def _refuse_first(file: Path, row: Row, problems: Iterable[str]) -> None:
+    for problem in problems:
+        where = f"{file}, row {printable(row.case)[:60]} ({printable(row.precision)[:60]})"
+        raise InputError(f"{where}, {printable(problem)[:260].rstrip('.')}.", REMEDY)
 
 
-def _floats(texts: Sequence[str]) -> list[float]:
-    """Numbers, without the cost of exact ones; nan alone for text that is not a number outside Python."""
-    joined = "".join(texts)
+def _problems(row: Row, kind: ReportedKind, doubtful: set[int]) -> Iterator[str]:
+    """What of a row cannot be, as ``FIELD: REASON``; only the first counts, as later ones may follow from it.
+
+    doubtful: ids of the metrics that are looked at one by one.
+    """
+    yield from _of_fields(row, kind)
+    for name, law in row.laws.items():
+        yield from (f"growth {name[:60]}, {problem}" for problem in _of_law(law))
+    if doubtful:
+        for name, metric in row.metrics.items():
+            if id(metric) in doubtful:
+                yield from (f"{name[:60]}: {problem}" for problem in _of_metric(metric, row.finite))
+    for name, series in row.series.items():
+        yield from (f"{name[:60]}: {problem}" for problem in _of_series(series))
+    yield from contradictions(row, kind)
+
+
+def _of_fields(row: Row, kind: ReportedKind) -> Iterator[str]:
+    for name in ("horizon", "time_reached"):
+        if cause := _cause(getattr(row, name)):
+            yield f"{name}: {cause}"
+    if row.outcome not in _OUTCOMES:
+        yield f"outcome: must be a known one; got {row.outcome[:60]!r}"
+    if not row.bits and row.precision != "exact":
+        yield "bits: a format without any"
+    if row.time_reached != row.horizon:
+        reached, horizon = exact(row.time_reached), exact(row.horizon)
+        # a time is rounded to the format, the horizon need not be
+        if reached * horizon < 0 or abs(reached) > abs(horizon) * (1 + Fraction(2, 2**row.bits)):
+            yield f"time_reached: {row.time_reached} is beyond {row.horizon}"
+    lacking = [name for name in kind.needed if name not in row.metrics]
+    if lacking and row.outcome not in UNMEASURED:
+        yield f"metrics: a row of {kind.name} without {', '.join(lacking)}"
+
+
+def _of_law(law: Law) -> Iterator[str]:
+    for name in ("first", "last", "detects", "lost_at"):
+        text = getattr(law, name)
+        if text is not None and (cause := _cause(text) or _negative(text)):
+            yield f"{name}: {cause}"
+
+
+_OUTCOMES = {*(outcome.value for outcome in Outcome), *UNMEASURED}
+WORDS = {
+    "error": ("nan", "missing", UNRESOLVED),
+    "duration": ("nan", "missing", "never"),
+    "value": ("nan", "missing", "never", UNRESOLVED),
+}
+"""Words in the place of a number, for each kind of metric."""
+
+
+def _of_metric(metric: Metric, finite: bool) -> Iterator[str]:
+    if metric.bound is not None and (cause := _cause(metric.bound) or _negative(metric.bound)):
+        yield f"its bound: {cause}"
+    if metric.value in WORDS[metric.kind]:
+        if metric.log10 is not None:
+            yield f"{metric.value} with a logarithm"
+        if finite and metric.value == "nan":
+            yield "said to be finite, but holds a NaN"
+        return
+    if cause := _cause(metric.value):
+        yield cause
+    if metric.kind != "value" and (negative := _negative(metric.value)):
+        yield negative
+    stated, expected = metric.log10, log10(exact(metric.value))
+    if (stated is None) != (expected is None) or (
+        stated is not None and expected is not None and not abs(stated - expected) < CLOSE
+    ):
+        yield f"value {metric.value} and log10 {stated} disagree"
+
+
+def _of_series(series: Series) -> Iterator[str]:
+    if len(series.times) != len(series.values):
+        yield "not one value for each time"
+    if not all(map(isfinite, _floats([*series.times, *series.values]))):
+        numbers = (value for value in series.values if value not in WORDS["value"])
+        yield from filter(None, map(_cause, (*series.times, *numbers)))
+
+
+def _cause(text: str) -> str:
+    """Why a text is not a number; empty where it is."""
     try:
-        return list(map(float, texts)) if joined.isascii() and "_" not in joined else [math.nan]
-    except ValueError:
-        return [math.nan]
+        exact(text)
+    except InputError as error:
+        return error.cause
+    return ""
+
+
+def _negative(text: str) -> str:
+    return f"{text} is negative" if exact(text) < 0 else ""
 
 
 def _doubtful(metrics: Sequence[Metric]) -> set[int]:
@@ -305,64 +415,10 @@ def _doubtful(metrics: Sequence[Metric]) -> set[int]:
     return set() if plain.all() else {id(metrics[index]) for index in numpy.flatnonzero(~plain).tolist()}
 
 
-def _where(file: Path, row: Row) -> str:
-    return f"{file}, row {printable(row.case)[:60]} ({printable(row.precision)[:60]})"
-
-
-def _check_row(file: Path, row: Row, kind: ReportedKind) -> None:
-    where = _where(file, row)
-    horizon, reached = (_number(f"{where}, {name}", getattr(row, name)) for name in ("horizon", "time_reached"))
-    if row.outcome not in _OUTCOMES:
-        raise InputError(f"{where}: outcome must be a known one; got {printable(row.outcome)[:60]!r}.", REMEDY)
-    if not row.bits and row.precision != "exact":
-        raise InputError(f"{where}, bits: a format without any.", REMEDY)
-    # a time is rounded to the format, the horizon need not be
-    if reached * horizon < 0 or abs(reached) > abs(horizon) * (1 + Fraction(2, 2**row.bits)):
-        raise InputError(f"{where}, time_reached: {row.time_reached} is beyond {row.horizon}.", REMEDY)
-    lacking = [name for name in kind.needed if name not in row.metrics]
-    if lacking and row.outcome not in UNMEASURED:
-        raise InputError(f"{where}: a row of {kind.name} without {', '.join(lacking)}.", REMEDY)
-    for name, law in row.laws.items():
-        _check_law(f"{where}, growth {printable(name)[:60]}", law)
-
-
-def _check_law(where: str, law: Law) -> None:
-    for name in ("first", "last", "detects", "lost_at"):
-        text = getattr(law, name)
-        if text is not None and _number(f"{where}, {name}", text) < 0:
-            raise InputError(f"{where}, {name}: {text} is negative.", REMEDY)
-
-
-_OUTCOMES = {*(outcome.value for outcome in Outcome), *UNMEASURED}
-WORDS = {
-    "error": ("nan", "missing", UNRESOLVED),
-    "duration": ("nan", "missing", "never"),
-    "value": ("nan", "missing", "never", UNRESOLVED),
-}
-"""Words in the place of a number, for each kind of metric."""
-
-
-def _check_metric(where: str, metric: Metric, finite: bool) -> None:
-    if metric.bound is not None and _number(where, metric.bound) < 0:
-        raise InputError(f"{where}: a negative bound {metric.bound}.", REMEDY)
-    if metric.value in WORDS[metric.kind]:
-        if metric.log10 is not None:
-            raise InputError(f"{where}: {metric.value} with a logarithm.", REMEDY)
-        if finite and metric.value == "nan":
-            raise InputError(f"{where}: said to be finite, but holds a NaN.", REMEDY)
-        return
-    number = _number(where, metric.value)
-    if number < 0 and metric.kind != "value":
-        raise InputError(f"{where}: a negative {metric.kind} {metric.value}.", REMEDY)
-    stated, expected = metric.log10, log10(number)
-    if (stated is None) != (expected is None) or (
-        stated is not None and expected is not None and not abs(stated - expected) < CLOSE
-    ):
-        raise InputError(f"{where}: value {metric.value} and log10 {stated} disagree.", REMEDY)
-
-
-def _number(where: str, value: str) -> Fraction:
+def _floats(texts: Sequence[str]) -> list[float]:
+    """Numbers, without the cost of exact ones; nan alone for text that is not a number outside Python."""
+    joined = "".join(texts)
     try:
-        return exact(value)
-    except InputError as error:
-        raise InputError(f"{where}: {error.cause}", REMEDY) from None
+        return list(map(float, texts)) if joined.isascii() and "_" not in joined else [math.nan]
+    except ValueError:
+        return [math.nan]

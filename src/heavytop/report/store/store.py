@@ -24,15 +24,17 @@ from heavytop.errors import InputError, why
 from heavytop.extras import import_heyoka
 from heavytop.files import read_whole, replace, without_repeats
 from heavytop.precision import available
-from heavytop.records import SCHEMA, Report, Row
+from heavytop.records import SCHEMA, Report, Row, Seconds
 from heavytop.report.document.kind import Kinds
-from heavytop.report.store.checks import REMEDY, check_keys, check_rows
+from heavytop.report.store.checks import REMEDY, check_keys, check_rows, check_seconds
 from heavytop.version import commit
 
 FILE = "report.json"
 DIGEST = "report.json.sha256"
 _UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 _NAME = 200
+_SECONDS = b'"seconds":'
+_decode_seconds = msgspec.json.Decoder(dict[str, Seconds]).decode
 _CHUNK = 100
 """Rows of a brief report that are checked at once: few, so that they are still in the cache when compared."""
 
@@ -78,16 +80,37 @@ class _Parts(msgspec.Struct, frozen=True):
 
 
 class _Rows:
-    """The rows of a brief report; raises InputError at one that is wrong."""
+    """The rows of a brief report; raises InputError at one that is wrong.
+
+    twins: the rows of another brief report that is gone through in step: what is there and here the same but for its
+    seconds is neither decoded nor checked again.
+    """
 
     def __init__(self, file: Path, rows: list[msgspec.Raw], kinds: Kinds) -> None:
         self._file = file
         self._kinds = kinds
         self._rows = rows
         self._decoder = msgspec.json.Decoder(Row)
+        self._checked: dict[int, Row] = {}
+        self.twins: _Rows | None = None
 
     def _decode(self, row: msgspec.Raw) -> Row:
         return records.of_row(self._decoder.decode(row))
+
+    def _twin(self, number: int) -> Row | None:
+        """The row of that number from what its twin is, with its own seconds; None where more differs."""
+        twin = None if self.twins is None else self.twins._checked.get(number)
+        if self.twins is None or twin is None:
+            return None
+        (*rest, old), (*own_rest, new) = (_without_seconds(rows._rows[number]) for rows in (self.twins, self))
+        if rest != own_rest:
+            return None
+        if new == old:
+            return twin
+        with suppress(*_UNREADABLE):
+            if _decode_seconds(old) == twin.seconds:
+                return replace_struct(twin, seconds=_decode_seconds(new))
+        return None
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -98,18 +121,30 @@ class _Rows:
     def __iter__(self) -> Iterator[Row]:
         seen: set[int] = set()
         for start in range(0, len(self._rows), _CHUNK):
+            numbers = range(start, min(start + _CHUNK, len(self._rows)))
+            twins = {number: row for number in numbers if (row := self._twin(number)) is not None}
             rows: list[Row] = []
             try:
-                rows.extend(map(self._decode, self._rows[start : start + _CHUNK]))
+                rows.extend(twins.get(number) or self._decode(self._rows[number]) for number in numbers)
             except _UNREADABLE as error:
                 where = f"row {start + len(rows) + 1}: {error}"
                 raise InputError(f"{self._file} is not a whole report: {where}.", REMEDY) from None
-            check_rows(self._file, rows, self._kinds)
+            check_rows(self._file, [row for n, row in zip(numbers, rows, strict=True) if n not in twins], self._kinds)
+            check_seconds(self._file, twins.values(), self._kinds)
+            self._checked = dict(zip(numbers, rows, strict=True))
             hashes = {hash(row.identity) for row in rows}
             if len(hashes) < len(rows) or hashes & seen:
                 check_keys(self._file, (self._decode(row) for row in self._rows))
             seen |= hashes
             yield from rows
+
+
+def _without_seconds(row: msgspec.Raw) -> tuple[bytes, bytes, bytes]:
+    """The text of a row before, after and in its seconds; all of it before these where it does not hold them once."""
+    text = bytes(row)
+    head, _, rest = text.partition(_SECONDS)
+    seconds, end, tail = rest.partition(b"}")
+    return (text, b"", b"") if _SECONDS in tail or not end else (head, tail, seconds + end)
 
 
 AnyReport = Report | Brief
@@ -152,9 +187,12 @@ def _read(path: Path, kind: type[_Content]) -> tuple[Path, _Content]:
         if file.suffix == ".gz":
             content = gzip.decompress(content)
     except (OSError, EOFError, zlib.error) as error:
-        raise InputError(f"{str(file)[:_NAME]} holds no report: {why(error)}.", REMEDY) from None
+        inside = sorted(entry.parent.name for entry in file.parent.glob(f"*/{FILE}*"))
+        remedy = f"Name one of the reports in it: {', '.join(dict.fromkeys(inside))}." if inside else REMEDY
+        raise InputError(f"{str(file)[:_NAME]} holds no report: {why(error)}.", remedy) from None
     if not content.lstrip().startswith(b"{"):
-        raise InputError(f"{str(file)[:_NAME]} is not a whole report: it is not JSON.", REMEDY)
+        remedy = f"`heavytop score {file}` reads a trajectory." if file.suffix == ".csv" else REMEDY
+        raise InputError(f"{str(file)[:_NAME]} is not a whole report: it is not JSON.", remedy)
     with ThreadPoolExecutor(1) as beside:
         digest = beside.submit(_has_its_digest, file, content)
         try:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from math import gcd
+from math import gcd, prod
 
 import sympy
 from flint import arb, fmpq_mpoly, fmpz_mat
@@ -18,33 +18,36 @@ from flint import arb, fmpq_mpoly, fmpz_mat
 from heavytop.exact.flint.balls import working_precision
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Field, Regularity
-from heavytop.features.claims.algebra.ring import Quotient, Unprovable, used
+from heavytop.features.claims.algebra.functions import INVERSE, turned
+from heavytop.features.claims.algebra.ring import Unprovable, used
 from heavytop.features.claims.algebra.signs import NUMBER_BITS
-from heavytop.features.claims.algebra.statement import Place
+from heavytop.features.claims.algebra.statement import Point
 
-_ARCS = ("asin", "acos", "atan", "atan2")
 _BITS = 192
 _LARGEST = 128
 _MOST_ARCS = 10
 # of the degree of a product of vectors that are no numbers
 _MOST_TURNS = 12
-_PLACES = 3
-Vector = tuple[Quotient, Quotient]
+_SAMPLES = 3
 
 
 class Arcs:
     """The relations between the inverse functions in a field over a region, found as they are asked for.
 
-    everywhere: what is regular all over the region.  places: some of it.  is_connected: whether it is, as far as the
+    everywhere: what is regular all over the region.  points: some of it.  is_connected: whether it is, as far as the
     symbols in these generators go.
     """
 
     def __init__(
-        self, field: Field, everywhere: Regularity, places: Sequence[Place], is_connected: Callable[[set[int]], bool]
+        self,
+        field: Field,
+        everywhere: Regularity,
+        points: Sequence[Point],
+        is_connected: Callable[[set[int]], bool],
     ) -> None:
         self._field = field
         self._everywhere = everywhere
-        self._places = places
+        self._points = points
         self._is_connected = is_connected
         self._known = 0
         self._free: list[int] = []
@@ -62,7 +65,7 @@ class Arcs:
         generators = self._field.tower.generators
         known, self._known = self._known, len(generators)
         for index in range(known, self._known):
-            if generators[index].kind in (*_ARCS, "log") and len(self._free) < _MOST_ARCS:
+            if generators[index].kind in (*INVERSE, "log") and len(self._free) < _MOST_ARCS:
                 try:
                     form = self._form_of(index)
                 except Unprovable:
@@ -80,7 +83,7 @@ class Arcs:
         arcs = [*alike, index]
         if is_log:
             return self._form_of_logarithm(arcs)
-        factors = _integer_relation([*(self._values(arc) for arc in arcs), [_pi()] * _PLACES])
+        factors = _integer_relation([*(self._values(arc) for arc in arcs), [_pi()] * _SAMPLES])
         if factors is None or not factors[-2]:
             return None
         weights = {arc: factor for arc, factor in zip(arcs, factors[:-1], strict=True) if factor}
@@ -100,39 +103,39 @@ class Arcs:
         if factors is None or not factors[-1] or sum(map(abs, factors)) > _MOST_TURNS:
             return None
         weights = {index: factor for index, factor in zip(logarithms, factors, strict=True) if factor}
-        parts = [tower.power(tower.generators[index].arguments[0], factor) for index, factor in weights.items()]
-        if tower.product(parts) != tower.number(1):
+        parts = (tower.generators[index].arguments[0] ** factor for index, factor in weights.items())
+        if prod(parts, start=tower.number(1)) != tower.number(1):
             return None
         last = logarithms[-1]
         total = sum((tower.gens[i] * factor for i, factor in weights.items() if i != last), tower.context.constant(0))
         return total / -weights[last]
 
     def _values(self, index: int) -> list[arb]:
-        """Its values at a few places of the region; of a number, the number."""
+        """Its values at a few sample points of the region; of a number, the number."""
         field = self._field
         if index in field.tower.signs.numbers:
-            return [field.tower.signs.numbers[index]] * _PLACES
-        places = self._places[:_PLACES]
-        if not places:
+            return [field.tower.signs.numbers[index]] * _SAMPLES
+        points = self._points[:_SAMPLES]
+        if not points:
             raise Unprovable("No place to look at.")
         try:
-            values = [evaluate(field.meaning(index), point, NUMBER_BITS) for point in places]
+            values = [evaluate(field.meaning(index), point, NUMBER_BITS) for point in points]
         except KeyError:
             raise Unprovable("No value at a place.") from None
         if not all(value.is_finite() for value in values):
             raise Unprovable("No value at a place.")
-        return [values[i % len(values)] for i in range(_PLACES)]
+        return [values[i % len(values)] for i in range(_SAMPLES)]
 
     # --- proofs -------------------------------------------------------------------------------------------------------
 
     def _is_proven(self, weights: dict[int, int], turns: int) -> bool:
         """Σ weight · arc = turns · π all over the region."""
         common = gcd(*weights.values())
-        whole = next(
+        multiple = next(
             h for h in range(1, common + 1) if common % h == 0 and 12 % Fraction(h * turns, common).denominator == 0
         )
-        weights = {arc: weight * whole // common for arc, weight in weights.items()}
-        angle = Fraction(whole * turns, common)
+        weights = {arc: weight * multiple // common for arc, weight in weights.items()}
+        angle = Fraction(multiple * turns, common)
         return self._is_multiple_of_pi(weights, angle) and (
             self._is_small_by_ranges(weights, angle) or self._is_small_somewhere(weights, angle)
         )
@@ -144,13 +147,12 @@ class Arcs:
         numbers = tower.signs.numbers.keys()
         if sum(abs(weight) for arc, weight in weights.items() if arc not in numbers) > _MOST_TURNS:
             return False
-        total = _times(field, (tower.number(1), tower.number(0)), _turn(field, -angle))
+        total = field.transcendental.circle_of_turn(-angle)
         for arc, weight in weights.items():
-            x, y = _vector(field, arc)
-            vector = x, tower.product((tower.number(1 if weight > 0 else -1), y))
+            sine, cosine = field.transcendental.direction(arc)
             for _ in range(abs(weight)):
-                total = _times(field, total, vector)
-        return not total[1].numerator
+                total = turned(total, (sine if weight > 0 else -sine, cosine))
+        return not total[0].numerator
 
     def _is_small_by_ranges(self, weights: dict[int, int], angle: Fraction) -> bool:
         """|Σ weight · arc − angle · π| < π by the ranges of the functions."""
@@ -206,30 +208,3 @@ def _integer_relation(values: Sequence[Sequence[arb]]) -> list[int] | None:
         if any(factors) and max(map(abs, factors)) <= _LARGEST and all(abs(int(v)) < 2**16 for v in short[count:]):
             return factors
     return None
-
-
-def _vector(field: Field, index: int) -> Vector:
-    """A vector of the angle that an inverse function is, but for a multiple of π."""
-    t, g = field.tower, field.tower.generators[index]
-    u = g.arguments[0]
-    if g.kind == "atan":
-        return t.polynomial(u.denominator), t.polynomial(u.numerator)
-    if g.kind == "atan2":
-        return g.arguments[1], u
-    other = t.root(t.sum((t.number(1), t.product((t.number(-1), u, u)))))
-    return (other, u) if g.kind == "asin" else (u, other)
-
-
-def _turn(field: Field, angle: Fraction) -> Vector:
-    """(cos, sin) of a multiple of π/12."""
-    whole = sympy.pi * sympy.Rational(angle.numerator, angle.denominator)
-    return field.enter(sympy.cos(whole)), field.enter(sympy.sin(whole))
-
-
-def _times(field: Field, a: Vector, b: Vector) -> Vector:
-    t = field.tower
-    minus = t.number(-1)
-    return (
-        t.sum((t.product((a[0], b[0])), t.product((minus, a[1], b[1])))),
-        t.sum((t.product((a[0], b[1])), t.product((a[1], b[0])))),
-    )

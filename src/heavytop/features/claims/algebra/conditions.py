@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from fractions import Fraction
@@ -13,12 +13,12 @@ from math import comb, prod
 import sympy
 from flint import arb, fmpq_mpoly
 
-from heavytop.features.claims.algebra.elliptic import modulus, wpinverse
+from heavytop.features.claims.algebra.elliptic import JACOBI, modulus, wpinverse
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Assumptions, Field, SolvedRelation
 from heavytop.features.claims.algebra.ring import Unprovable, used
 from heavytop.features.claims.algebra.signs import Sign
-from heavytop.features.claims.algebra.structure import NAMES, Defined, at_values, sign_of
+from heavytop.features.claims.algebra.structure import Defined, at_values, rationals, sign_of
 
 _LONGEST = 120
 _BITS = 512
@@ -95,54 +95,45 @@ def as_text(expression: sympy.Expr) -> str:
     return str(expression)
 
 
-def condition(function: str, arguments: tuple[sympy.Expr, ...]) -> frozenset[Need]:
-    """Conditions for ``function`` to be defined and real: ``/`` on a divisor, ``sqrt``, ``log``, ..."""
-    u = arguments[0]
-    if function == "/":
-        needs = {Need(ConditionKind.NONZERO, u)}
-    elif function == "sqrt":
-        needs = {Need(ConditionKind.NONNEGATIVE, u)}
-    elif function == "log":
-        needs = {Need(ConditionKind.POSITIVE, u)}
-    elif function in ("asin", "acos"):
-        needs = {Need(ConditionKind.NONNEGATIVE, 1 - u**2, f"-1 ≤ {as_text(u)} ≤ 1")}
-    elif function in ("tan", "sec"):
-        needs = {Need(ConditionKind.NONZERO, sympy.cos(u))}
-    elif function in ("coth", "csch"):
-        needs = {Need(ConditionKind.NONZERO, sympy.sinh(u))}
-    elif function in ("wp", "wpprime", "wzeta"):
-        text = f"{u} is not a period of wp(u, {arguments[1]}, {arguments[2]})"
-        needs = {Need(ConditionKind.NONZERO, wpinverse(*arguments), text)}
-    elif function in ("wp3", "wp3prime", "wzeta3", "wsigma3"):
-        _, g2, g3 = arguments
-        needs = {Need(ConditionKind.POSITIVE, g2**3 - 27 * g3**2)}
-    elif function in _OF_PARAMETER:
-        below, above = _OF_PARAMETER[function]
-        m = arguments[-1]
-        if isinstance(m, sympy.exp) and not isinstance(modulus(m), modulus):
-            return frozenset()  # a nome, whose own m is between 0 and 1
-        needs = {Need(below, m)} if below else set()
-        needs.add(Need(above, 1 - m, f"{m} {'<' if above is ConditionKind.POSITIVE else '≤'} 1"))
-        if function == "ellipticPi":
-            needs.add(Need(ConditionKind.POSITIVE, 1 - u, f"{u} < 1"))
-        if function == "thetaArgument":
-            needs.add(Need(ConditionKind.NONZERO, arguments[1]))
-    elif function == "atan2":
-        needs = {Need(ConditionKind.POSITIVE, u**2 + arguments[1] ** 2)}
-    else:
-        needs = set()
-    return frozenset(need for need in needs if not _is_plain(need))
-
-
-_P, _N = ConditionKind.POSITIVE, ConditionKind.NONNEGATIVE
+_Z, _P, _N = ConditionKind.NONZERO, ConditionKind.POSITIVE, ConditionKind.NONNEGATIVE
+_NEEDS: dict[str, Callable[..., Need]] = {
+    "/": lambda u: Need(_Z, u),
+    "sqrt": lambda u: Need(_N, u),
+    "log": lambda u: Need(_P, u),
+    "atan2": lambda y, x: Need(_P, y**2 + x**2),
+    **dict.fromkeys(("asin", "acos"), lambda u: Need(_N, 1 - u**2, f"-1 ≤ {as_text(u)} ≤ 1")),
+    **dict.fromkeys(("tan", "sec"), lambda u: Need(_Z, sympy.cos(u))),
+    **dict.fromkeys(("coth", "csch"), lambda u: Need(_Z, sympy.sinh(u))),
+    **dict.fromkeys(
+        ("wp", "wpprime", "wzeta"),
+        lambda u, g2, g3: Need(_Z, wpinverse(u, g2, g3), f"{u} is not a period of wp(u, {g2}, {g3})"),
+    ),
+    **dict.fromkeys(("wp3", "wp3prime", "wzeta3", "wsigma3"), lambda u, g2, g3: Need(_P, g2**3 - 27 * g3**2)),
+    "ellipticPi": lambda n, phi, m: Need(_P, 1 - n, f"{n} < 1"),
+    "thetaArgument": lambda u, s, m: Need(_Z, s),
+}
+"""Conditions on a divisor ``/``, a radicand, and the arguments of functions."""
 _OF_PARAMETER: dict[str, tuple[ConditionKind | None, ConditionKind]] = {
-    **dict.fromkeys((*NAMES, "am"), (_N, _N)),
+    **dict.fromkeys((*JACOBI, "am"), (_N, _N)),
     **dict.fromkeys(("Theta", "Eta", "thetan", "jacobiZeta", "modulus", *(f"theta{i}" for i in range(1, 5))), (_N, _P)),
     **dict.fromkeys(("nome", "thetaRate", "thetaArgument"), (_P, _P)),
     **dict.fromkeys(("ellipticF", "ellipticK", "ellipticPi"), (None, _P)),
     "ellipticE": (None, _N),
 }
 """Sign conditions on the last argument, a parameter m or a nome q, compared with 0, and 1 with it."""
+
+
+def condition(function: str, arguments: tuple[sympy.Expr, ...]) -> frozenset[Need]:
+    """Conditions for ``function`` to be defined and real: ``/`` on a divisor, ``sqrt``, ``log``, ..."""
+    needs, m = set(), arguments[-1]
+    # a nome has an m of its own, between 0 and 1
+    if function in _OF_PARAMETER and not (isinstance(m, sympy.exp) and not isinstance(modulus(m), modulus)):
+        below, above = _OF_PARAMETER[function]
+        needs = {Need(below, m)} if below else set()
+        needs.add(Need(above, 1 - m, f"{m} {'<' if above is _P else '≤'} 1"))
+    if function in _NEEDS:
+        needs.add(_NEEDS[function](*arguments))
+    return frozenset(need for need in needs if not _is_plain(need))
 
 
 def _is_plain(need: Need) -> bool:
@@ -189,7 +180,7 @@ def is_exactly_zero(expression: sympy.Expr, values: Mapping[sympy.Symbol, Fracti
 
     if not all(need.is_met(values) for need in conditions_of([expression])):
         return None
-    exact = {symbol: sympy.Rational(value.numerator, value.denominator) for symbol, value in values.items()}
+    exact = rationals(values)
     try:
         value = at_values(expression, exact)
     except ValueError:
@@ -456,7 +447,7 @@ def _occurs_inside(field: Field, index: int, p: fmpq_mpoly) -> bool:
 _ORDERS = 4
 """Derivatives that are looked at where a formula is not a polynomial."""
 _MOST_OPERATIONS = 60
-"""Of a formula that is looked at."""
+"""Operations of a formula that is looked at."""
 _MAY_JUMP = (sympy.Abs, sympy.sign, sympy.DiracDelta, sympy.atan2)
 
 
@@ -512,6 +503,4 @@ def is_never_zero(e: sympy.Expr, assumptions: Assumptions) -> bool:
         value = field.enter(e)
     except Unprovable:
         return False
-    return field.tower.sign(value).strict or (
-        bool(assumptions.relations) and field.never_zero_on_relations(value.numerator)
-    )
+    return field.tower.sign(value).strict or field.never_zero_on_relations(value.numerator)

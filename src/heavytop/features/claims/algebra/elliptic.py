@@ -1,6 +1,10 @@
 """Elliptic functions and integrals as formulas of a claim: the derivative of each, which is its algebra, and its value.
 
-Each is a free generator over those that its derivative holds, constant parameters beside it:
+Jacobi's functions of a real argument u and a parameter m = k², 0 ≤ m ≤ 1 (DLMF 22.6.1, 22.13.1):
+
+    sn² + cn² = 1,   dn² + m sn² = 1,   dn > 0,   sn' = cn dn,   cn' = −sn dn,   dn' = −m sn cn
+
+Each other is a free generator over those that its derivative holds, constant parameters beside it:
 
     am' = dn,   ellipticF' = 1/Δ,   ellipticE' = Δ,   ellipticPi' = 1/((1 − n sin²φ) Δ),   Δ = √(1 − m sin²φ)
     thetan' = thetan Z,   Z(u) = E(am u) − u E/K          (Neville's θn = Θ(u)/Θ(0); DLMF 20.1, 22.16.32)
@@ -24,7 +28,6 @@ from heavytop.errors import OutOfReach
 from heavytop.exact.elliptic.jacobi import jacobi
 from heavytop.exact.elliptic.weierstrass import DegenerateLattice, from_invariants, thetas
 from heavytop.exact.flint.balls import nearest_integer
-from heavytop.features.claims.algebra.structure import cn, dn, sn
 
 
 class Analytic(sympy.Function):  # type: ignore[misc]
@@ -45,7 +48,7 @@ class Analytic(sympy.Function):  # type: ignore[misc]
 
     @classmethod
     def eval(cls, *arguments: sympy.Expr) -> sympy.Expr | None:
-        """Values at 0, at −u, and as the inverse of another function."""
+        """Values at 0, at −u, at m = 0 and 1, and as the inverse of another function."""
         last = cls.moving - 1
         u, m = arguments[last], arguments[-1]
         if cls.parity and u.could_extract_minus_sign():
@@ -57,21 +60,32 @@ class Analytic(sympy.Function):  # type: ignore[misc]
             return u.args[0]
         if cls is third and arguments[0] == 0:
             return first(u, m)
-        if cls is am and m == 1:
-            return sympy.atan(sympy.sinh(u))
-        return sympy.Integer(1) if m == 0 and cls is thetan else u if m == 0 and cls in _OF_ANGLE else None
+        simpler = _DEGENERATE[cls.__name__].get(m) if cls.__name__ in _DEGENERATE else None
+        return None if simpler is None else simpler(u)
 
 
 def _made(name: str, nargs: int, parity: int = 0, moving: int = 1) -> Any:
     return type(name, (Analytic,), {"nargs": nargs, "parity": parity, "moving": moving, "__module__": __name__})
 
 
+JACOBI = ("sn", "cn", "dn")
+sn, cn, dn = (_made(name, 2, parity) for name, parity in zip(JACOBI, (-1, 1, 1), strict=True))
 _OF_ANGLE = am, first, second = tuple(_made(name, 2, -1) for name in ("am", "ellipticF", "ellipticE"))
 third, thetan = _made("ellipticPi", 3, -1, 2), _made("thetan", 2, 1)
 wp, wp3, wpinverse, wsigma3 = (_made(name, 3, 1) for name in ("wp", "wp3", "wpinverse", "wsigma3"))
 wpprime, wp3prime = (_made(name, 3, -1) for name in ("wpprime", "wp3prime"))
 wzeta, wsigma, wzeta3 = (_made(name, 3, -1) for name in ("wzeta", "wsigma", "wzeta3"))
 _INVERSE = {"am": "ellipticF", "ellipticF": "am"}
+_DEGENERATE: dict[str, dict[int, Callable[[sympy.Expr], sympy.Expr]]] = {
+    "sn": {0: sympy.sin, 1: sympy.tanh},
+    "cn": {0: sympy.cos, 1: sympy.sech},
+    "dn": {0: lambda u: sympy.Integer(1), 1: sympy.sech},
+    "am": {0: lambda u: u, 1: lambda u: sympy.atan(sympy.sinh(u))},
+    "ellipticF": {0: lambda u: u},
+    "ellipticE": {0: lambda u: u},
+    "thetan": {0: lambda u: sympy.Integer(1)},
+}
+"""Values where m = 0 or 1, in simpler functions."""
 
 
 class modulus(sympy.Function):  # type: ignore[misc]  # noqa: N801
@@ -92,6 +106,9 @@ def _delta(phi: sympy.Expr, m: sympy.Expr) -> sympy.Expr:
 
 
 _RATES: dict[str, Callable[..., sympy.Expr]] = {
+    "sn": lambda u, m: cn(u, m) * dn(u, m),
+    "cn": lambda u, m: -sn(u, m) * dn(u, m),
+    "dn": lambda u, m: -m * sn(u, m) * cn(u, m),
     "am": dn,
     "ellipticF": lambda phi, m: 1 / _delta(phi, m),
     "ellipticE": _delta,
@@ -240,7 +257,7 @@ def _of_lattice(name: str, u: arb, g2: arb, g3: arb) -> arb:
 
 
 VALUES: dict[str, Callable[..., arb]] = {
-    **{name: lambda u, m, i=i: jacobi_at(u, m)[i] for i, name in enumerate(("sn", "cn", "dn"))},
+    **{name: lambda u, m, i=i: jacobi_at(u, m)[i] for i, name in enumerate(JACOBI)},
     "am": _amplitude,
     "ellipticF": lambda phi, m: acb.elliptic_f(acb(phi), acb(m)).real if m < 1 else _NAN,
     "ellipticE": lambda phi, m: acb.elliptic_e_inc(acb(phi), acb(m)).real if m <= 1 else _NAN,

@@ -14,25 +14,12 @@ from heavytop.features.claims.algebra.elliptic import VALUES
 from heavytop.features.claims.algebra.ring import Unprovable
 from heavytop.features.claims.algebra.structure import Defined
 
+_OF_ARB = (
+    *("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2"),
+    *("sinh", "cosh", "tanh", "sech", "csch", "coth", "asinh", "acosh", "atanh"),
+)
 _FUNCTIONS: dict[str, Callable[..., arb]] = {
-    "exp": arb.exp,
-    "log": arb.log,
-    "sin": arb.sin,
-    "cos": arb.cos,
-    "tan": arb.tan,
-    "sinh": arb.sinh,
-    "cosh": arb.cosh,
-    "tanh": arb.tanh,
-    "sech": arb.sech,
-    "csch": arb.csch,
-    "coth": arb.coth,
-    "asin": arb.asin,
-    "acos": arb.acos,
-    "atan": arb.atan,
-    "asinh": arb.asinh,
-    "acosh": arb.acosh,
-    "atanh": arb.atanh,
-    "atan2": lambda y, x: arb.atan2(y, x),
+    **{name: getattr(arb, name) for name in _OF_ARB},
     "Abs": abs,
     "sign": arb.sgn,
     **VALUES,

@@ -11,23 +11,23 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from math import prod
 from typing import Any
 
 import sympy
 from flint import fmpq_mpoly
 
-from heavytop.features.claims.algebra.elliptic import FREE, WEIERSTRASS
+from heavytop.features.claims.algebra.elliptic import FREE, JACOBI, WEIERSTRASS
 from heavytop.features.claims.algebra.evaluate import evaluate
-from heavytop.features.claims.algebra.functions import Refine, Transcendental
+from heavytop.features.claims.algebra.functions import INVERSE, Refine, Transcendental
 from heavytop.features.claims.algebra.rational import Tower, forces_zero
 from heavytop.features.claims.algebra.ring import Quotient, Unprovable, used
 from heavytop.features.claims.algebra.signs import NUMBER_BITS, UNKNOWN, Sign
-from heavytop.features.claims.algebra.structure import NAMES, Defined
+from heavytop.features.claims.algebra.structure import Defined
 
 _MAX_EXPONENT = 64
 _MAX_REFINEMENTS = 12
 _HYPERBOLIC = ("tanh", "sech", "sinh", "cosh", "coth", "csch")
-_INVERSE = ("asin", "acos", "atan", "atan2")
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +99,8 @@ class Field:
     def _reset(self) -> None:
         self.tower = Tower()
         self._known: dict[Any, Quotient] = {}
-        self._expressions: dict[int, sympy.Expr] = {}
-        self._transcendental = Transcendental(self, self._divisors)
+        self._roots: dict[int, sympy.Expr] = {}
+        self.transcendental = Transcendental(self, self._divisors)
         a = self.assumptions
         solved = {solution.symbol for solution in a.solved}
         self._ranges = {symbol: ends for symbol, ends in a.ranges if symbol not in solved}
@@ -121,22 +121,15 @@ class Field:
         facts += [(fact, False) for fact in a.weak]
         for fact, strict in facts:
             if not fact.free_symbols & solved:
-                self._declare(fact, strict=strict)
+                self.tower.declare(self.enter(fact), strict=strict)
         # the last solution holds none of the symbols that are solved before it
         for solution in reversed(a.solved):
             if solution.radicand is not None:
-                self._declare(solution.radicand)
+                self.tower.declare(self.enter(solution.radicand))
             self._known[solution.symbol] = self.enter(solution.value)
         for fact, strict in facts:
             if fact.free_symbols & solved:
-                self._declare(fact, strict=strict)
-
-    def _declare(self, fact: sympy.Expr, *, strict: bool = True) -> None:
-        """fact > 0, or >= 0 where it is not strict."""
-        value = self.enter(fact)
-        below = self.tower.signs.of(value.denominator)
-        above = value.numerator if below.value else self.tower.times(value.numerator, value.denominator)
-        self.tower.signs.declare(above, Sign(below.value or 1, strict))
+                self.tower.declare(self.enter(fact), strict=strict)
 
     def _declare_greater(self, symbol: sympy.Symbol, bound: sympy.Expr) -> None:
         """symbol = bound + excess."""
@@ -146,19 +139,14 @@ class Field:
             excess = self.tower.add(f"{symbol} - ({bound})", constant=True, sign=1, strict=True)
             self.tower.signs.declare_form(index, floor.numerator + self.tower.gens[excess])
         else:
-            self._declare(symbol - bound)
+            self.tower.declare(self.enter(symbol - bound))
 
     def _add(self, meaning: sympy.Expr, *, constant: bool = True, sign: Sign, kind: str = "symbol") -> int:
         index = self.tower.add(meaning, constant=constant, sign=sign.value, strict=sign.strict, kind=kind)
-        self._expressions[index] = meaning
         self._known[meaning] = self.tower.polynomial(self.tower.gens[index])
         if meaning in self._ranges:
             self.tower.signs.ranges[index] = self._ranges[meaning]
         return index
-
-    def means(self, index: int, meaning: sympy.Expr) -> None:
-        """Generator ``index`` stands for this expression."""
-        self._expressions[index] = meaning
 
     def enter(self, expression: sympy.Expr) -> Quotient:
         """The expression in this field; raises Unprovable for what it cannot carry."""
@@ -189,20 +177,21 @@ class Field:
         simpler: the same polynomial where more is known of its generators.
         """
         try:
-            numerator = simpler(self.enter(expression).numerator)
-            relations = [self.enter(relation).numerator for relation in self.assumptions.relations]
+            return self._forces([], simpler(self.enter(expression).numerator), radical=radical)
         except Unprovable:
             return False
-        return self._forces(relations, numerator, radical=radical)
 
-    def never_zero_on_relations(self, p: fmpq_mpoly) -> bool:
-        """True only where the relations of the claim and p = 0 exclude each other."""
-        relations = [self.enter(relation).numerator for relation in self.assumptions.relations]
-        return bool(relations) and self._forces([*relations, p], self.tower.one, radical=False)
+    def never_zero_on_relations(self, *zeros: fmpq_mpoly) -> bool:
+        """True only where the relations of the claim exclude each other and that these polynomials are 0."""
+        try:
+            return self._forces(list(zeros), self.tower.one, radical=False)
+        except Unprovable:
+            return False
 
-    def _forces(self, relations: list[fmpq_mpoly], p: fmpq_mpoly, *, radical: bool) -> bool:
-        """Also where a factor that is never 0 has to be divided out of the ideal."""
-        if not relations:
+    def _forces(self, zeros: list[fmpq_mpoly], p: fmpq_mpoly, *, radical: bool) -> bool:
+        """The relations of the claim and ``zeros`` do, also where a factor that is never 0 has to be divided out."""
+        relations = [*(self.enter(relation).numerator for relation in self.assumptions.relations), *zeros]
+        if not self.assumptions.relations:
             return False
         roots = self.tower.relations()
         if forces_zero([*relations, *roots], p, radical=radical):
@@ -252,14 +241,6 @@ class Field:
         except Unprovable:
             return False
 
-    def relations_exclude_each_other(self) -> bool:
-        """True only where no point lies on all relations."""
-        try:
-            relations = [self.enter(relation).numerator for relation in self.assumptions.relations]
-        except Unprovable:
-            return False
-        return self._forces(relations, self.tower.one, radical=False)
-
     def is_constant(self, value: Quotient) -> bool:
         """True where only generators that are constant in time are left."""
         return all(self.tower.generators[i].constant for i in used(value.numerator) | used(value.denominator))
@@ -281,11 +262,11 @@ class Field:
             self._add(e, sign=UNKNOWN)
             return self._known[e]
         if e.is_Add:
-            return tower.sum(self.enter(part) for part in e.args)
+            return sum(map(self.enter, e.args), tower.number(0))
         if e.is_Mul:
-            return tower.product(self.enter(part) for part in e.args)
+            return prod(map(self.enter, e.args), start=tower.number(1))
         if e is sympy.E or isinstance(e, sympy.exp):
-            return self._transcendental.exponential(self.enter(sympy.log(e) if e is sympy.E else e.args[0]))
+            return self.transcendental.exponential(self.enter(sympy.log(e) if e is sympy.E else e.args[0]))
         if e.is_Pow:
             return self._power(e)
         return self._function(type(e).__name__, [self.enter(part) for part in e.args])
@@ -301,31 +282,31 @@ class Field:
     def _function(self, name: str, arguments: list[Quotient]) -> Quotient:
         tower, first = self.tower, arguments[0]
         if name in _HYPERBOLIC:
-            return self._transcendental.hyperbolic(name, first)
+            return self.transcendental.hyperbolic(name, first)
         if name in ("sin", "cos", "tan"):
-            sine, cosine = self._transcendental.circle(first)
-            return sine if name == "sin" else cosine if name == "cos" else tower.divide(sine, cosine)
+            sine, cosine = self.transcendental.circle(first)
+            return sine if name == "sin" else cosine if name == "cos" else sine / cosine
         if name == "Abs":
             return tower.absolute(first)
         if name == "sign":
-            return tower.divide(tower.absolute(first), first)
+            return tower.absolute(first) / first
         if name == "log":
-            return self._transcendental.logarithm(first)
+            return self.transcendental.logarithm(first)
         if name in WEIERSTRASS:
-            return self._transcendental.weierstrass(name, (first, arguments[1], arguments[2]))
-        if name in NAMES:
-            return self._transcendental.jacobi(name, first, arguments[1])
-        if name in _INVERSE or name in FREE:
-            return self._transcendental.function(name, tuple(arguments))
+            return self.transcendental.weierstrass(name, (first, arguments[1], arguments[2]))
+        if name in JACOBI:
+            return self.transcendental.jacobi(name, first, arguments[1])
+        if name in INVERSE or name in FREE:
+            return self.transcendental.function(name, tuple(arguments))
         raise Unprovable(f"{name} has no place in the algebra.")
 
     def _power(self, e: sympy.Expr) -> Quotient:
         base, exponent = e.args
         if exponent.is_Integer and abs(int(exponent)) <= _MAX_EXPONENT:
-            return self.tower.power(self.enter(base), int(exponent))
+            return self.enter(base) ** int(exponent)
         if exponent.is_Rational and exponent.q in (2, 4) and abs(int(exponent.p)) <= _MAX_EXPONENT:
             root = self.tower.root(self.enter(base))
-            return self.tower.power(root if exponent.q == 2 else self.tower.root(root), int(exponent.p))
+            return (root if exponent.q == 2 else self.tower.root(root)) ** int(exponent.p)
         raise Unprovable(f"A power must be a small multiple of 1/4; got {exponent}.")
 
     # --- and back ---------------------------------------------------------------------------------------------------
@@ -338,10 +319,12 @@ class Field:
 
     def meaning(self, index: int) -> sympy.Expr:
         """The meaning of a generator."""
-        if index not in self._expressions:
-            (square,) = self.tower.generators[index].arguments
-            self._expressions[index] = sympy.sqrt(self.expression(square))
-        return self._expressions[index]
+        g = self.tower.generators[index]
+        if g.kind != "root":
+            return g.meaning
+        if index not in self._roots:
+            self._roots[index] = sympy.sqrt(self.expression(*g.arguments))
+        return self._roots[index]
 
 
 def _placeholder(index: int) -> sympy.Symbol:
@@ -424,8 +407,7 @@ class Regularity:
         if g.kind == "log":
             return self._unless_positive(g.arguments[0], True, "> 0")
         if g.kind in ("asin", "acos"):
-            square = tower.product((tower.number(-1), g.arguments[0], g.arguments[0]))
-            return self._unless_positive(tower.sum((tower.number(1), square)), analytic, wanted)
+            return self._unless_positive(1 - g.arguments[0] * g.arguments[0], analytic, wanted)
         if g.kind == "atan2":
             y, x = g.arguments
             right = tower.sign(x)
@@ -440,9 +422,11 @@ class Regularity:
         return f"{self._text(value.numerator, value.denominator)} {wanted} is not shown"
 
     def _text(self, numerator: fmpq_mpoly, denominator: Any = None) -> str:
+        tower = self._field.tower
         try:
-            below = self._field.tower.one if denominator is None else denominator
-            text = str(self._field.expression(Quotient(numerator, below)))
+            text = str(
+                self._field.expression(Quotient(numerator, tower.one if denominator is None else denominator, tower))
+            )
         except Unprovable:
             text = "an intermediate value"
         return text if len(text) <= _SHOWN else text[: _SHOWN - 1] + "…"

@@ -6,26 +6,19 @@ Exponentials and circular functions of commensurable arguments become powers of 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from fractions import Fraction
+from math import prod
 from typing import Any, Protocol
 
 import sympy
 from flint import fmpq_mpoly, fmpz
 
-from heavytop.features.claims.algebra import structure
-from heavytop.features.claims.algebra.elliptic import FREE, WEIERSTRASS, wpinverse
+from heavytop.features.claims.algebra.elliptic import FREE, WEIERSTRASS, cn, sn, wpinverse
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.rational import Tower
 from heavytop.features.claims.algebra.ring import Quotient, Unprovable, used
-from heavytop.features.claims.algebra.signs import NUMBER_BITS, Sign
-
-# Inverse functions that are one another: asin u + acos u = π/2, atan u + atan 1/u = ± π/2, acos(cos w) = w.
-
-
-# below π/2 and π
-_QUARTER, _HALF = Fraction(3, 2), Fraction(3)
-Known = Callable[[str, Quotient], Quotient | None]
+from heavytop.features.claims.algebra.signs import NUMBER_BITS, PLUS, UNKNOWN, Sign
 
 
 class Expressions(Protocol):
@@ -36,80 +29,14 @@ class Expressions(Protocol):
     def enter(self, expression: sympy.Expr) -> Quotient: ...
     def expression(self, value: Quotient) -> sympy.Expr: ...
     def is_constant(self, value: Quotient) -> bool: ...
-    def means(self, index: int, meaning: sympy.Expr) -> None: ...
-
-
-def same_as(name: str, u: Quotient, field: Expressions, known: Known) -> Quotient | None:
-    """asin, acos or atan of ``u`` through a function that the field has already, or through the angle in it.
-
-    known: the generator of a function of an argument, None before the first.
-    """
-    if name not in ("asin", "acos", "atan"):
-        return None
-    t = field.tower
-    angle = _angle_in(name, u, field)
-    if angle is not None:
-        return angle
-    minus = t.product((t.number(-1), u))
-    opposite = known(name, minus)
-    if opposite is not None:
-        return _difference(field, field.enter(sympy.pi) if name == "acos" else t.number(0), opposite)
-    quarter = Fraction(1, 2)
-    if name == "atan":
-        sign = t.sign(u)
-        partner = known("atan", t.power(u, -1)) if sign.strict and sign.value else None
-        quarter *= sign.value
-    else:
-        partner = known("acos" if name == "asin" else "asin", u)
-    if partner is None:
-        return None
-    return _difference(field, t.product((t.number(quarter), field.enter(sympy.pi))), partner)
-
-
-def _difference(field: Expressions, a: Quotient, b: Quotient) -> Quotient:
-    t = field.tower
-    return t.sum((a, t.product((t.number(-1), b))))
-
-
-def _angle_in(name: str, u: Quotient, field: Expressions) -> Quotient | None:
-    """w of acos(cos w), asin(sin w), atan(tan w), where w lies in the range of the inverse function."""
-    t = field.tower
-    for sine, cosine, angle in _circles(field):
-        above, below = {
-            "acos": (t.gens[cosine], t.one),
-            "asin": (t.gens[sine], t.one),
-            "atan": (t.gens[sine], t.gens[cosine]),
-        }[name]
-        if t.reduce(t.times(u.numerator, below)) == t.reduce(t.times(above, u.denominator)):
-            inside = is_between(field, angle, Fraction(0), _HALF) if name == "acos" else is_below_quarter(field, angle)
-            return angle if inside else None
-    return None
-
-
-def _circles(field: Expressions) -> Iterator[tuple[int, int, Quotient]]:
-    """(sine, cosine, angle) of the field."""
-    for sine, cosine in field.tower.signs.circles.items():
-        arguments = field.tower.generators[sine].arguments
-        if arguments:
-            yield sine, cosine, arguments[0]
-
-
-def is_below_quarter(field: Expressions, angle: Quotient) -> bool:
-    """|angle| ≤ 3/2, so that its cosine is > 0."""
-    return is_between(field, angle, -_QUARTER, _QUARTER)
-
-
-def is_between(field: Expressions, angle: Quotient, low: Fraction, high: Fraction) -> bool:
-    """low ≤ angle ≤ high all over the domain, shown."""
-    t = field.tower
-    up = _difference(field, angle, t.number(low))
-    down = _difference(field, t.number(high), angle)
-    return t.sign(up).value > 0 and t.sign(down).value > 0
 
 
 _MAX_MULTIPLE = 64
 _FACTORED_BITS = 64
-_INVERSE = ("asin", "acos", "atan", "atan2")
+INVERSE = ("asin", "acos", "atan", "atan2")
+# below π/2 and π
+_QUARTER, _HALF = Fraction(3, 2), Fraction(3)
+_UNIT = (Fraction(-1), Fraction(1))
 # 22/7 is larger than pi
 _RANGES = {
     "asin": (Fraction(-11, 7), Fraction(11, 7)),
@@ -124,6 +51,12 @@ _OF_ANGLE = ("am", "ellipticF", "ellipticE", "ellipticPi")
 _POSITIVE = {"thetan": True, "wsigma3": True, "modulus": False}
 """Whether it is never 0; where not, it is 0 with its argument alone."""
 Circle = tuple[Quotient, Quotient]
+"""(sin, cos) of an angle, or a multiple of both."""
+
+
+def turned(a: Circle, b: Circle) -> Circle:
+    """(sin, cos) of a sum."""
+    return a[0] * b[1] + a[1] * b[0], a[1] * b[1] - a[0] * b[0]
 
 
 class Refine(Exception):
@@ -139,8 +72,7 @@ class Transcendental:
         self._divisors = divisors
         self._bases: list[tuple[str, Quotient, int]] = []
         self._functions: dict[tuple[str, ...], int] = {}
-        self._weierstrass: dict[tuple[str, ...], tuple[int, int]] = {}
-        self._elliptic: dict[tuple[str, ...], tuple[int, int]] = {}
+        self._pairs: dict[tuple[str, ...], tuple[int, int]] = {}
 
     # --- exponentials -----------------------------------------------------------------------------------------------
 
@@ -151,35 +83,30 @@ class Transcendental:
             return factor
         parts = self._in_parts(argument)
         if len(parts) > 1:
-            return self._tower.product((factor, *(self.exponential(part) for part in parts)))
+            return prod(map(self.exponential, parts), start=factor)
 
-        def make(base: Quotient, _divisor: int) -> int:
+        def make(base: Quotient) -> int:
             meaning = sympy.exp(self._field.expression(base))
-            index = self._new("exp", meaning, (base,), Sign(1, True))
+            index = self._new("exp", meaning, (base,), PLUS)
             self._declare_size(index, self._tower.sign(base).value)
             return index
 
         index, multiple = self._multiple("exp", argument, make)
-        return self._tower.product(
-            (factor, self._tower.power(self._tower.polynomial(self._tower.gens[index]), multiple))
-        )
+        return factor * self._generator(index) ** multiple
 
     def hyperbolic(self, name: str, argument: Quotient) -> Quotient:
         """sinh, cosh, tanh and their reciprocals."""
-        t = self._tower
         up = self.exponential(argument)
-        down = t.power(up, -1)
-        sine, cosine = t.sum((up, t.product((t.number(-1), down)))), t.sum((up, down))
-        two = t.number(2)
+        down, two = 1 / up, self._tower.number(2)
         above, below = {
-            "sinh": (sine, two),
-            "cosh": (cosine, two),
-            "tanh": (sine, cosine),
-            "coth": (cosine, sine),
-            "sech": (two, cosine),
-            "csch": (two, sine),
+            "sinh": (up - down, two),
+            "cosh": (up + down, two),
+            "tanh": (up - down, up + down),
+            "coth": (up + down, up - down),
+            "sech": (two, up + down),
+            "csch": (two, up - down),
         }[name]
-        return t.divide(above, below)
+        return above / below
 
     def _in_parts(self, argument: Quotient) -> list[Quotient]:
         """Constant terms apart from those that move; all terms apart where each is a multiple of a known base."""
@@ -187,7 +114,8 @@ class Transcendental:
         still = [term for term in terms if self._field.is_constant(term)]
         if still and len(still) < len(terms):
             moving = [term for term in terms if not self._field.is_constant(term)]
-            return [self._tower.sum(still), self._tower.sum(moving)]
+            zero = self._tower.number(0)
+            return [sum(still, zero), sum(moving, zero)]
         bases = [base for kind, base, _ in self._bases if kind == "exp"]
         multiples = all(any(self._tower.ratio(term, base) is not None for base in bases) for term in terms)
         return terms if multiples else [argument]
@@ -206,7 +134,7 @@ class Transcendental:
                 inside = t.generators[index].arguments[0]
                 base = inside if twice % 2 == 0 else t.root(inside)
                 power = int(twice) // 2 if twice % 2 == 0 else int(twice)
-                factor = t.product((factor, t.power(base, power)))
+                factor = factor * base**power
             else:
                 rest[monomial] = coefficient
         return t.polynomial(t.context.from_dict(rest)), factor
@@ -219,7 +147,7 @@ class Transcendental:
             if sign < 0:
                 self._tower.signs.declare_below_one(index)
 
-    def _multiple(self, kind: str, argument: Quotient, make: Callable[[Quotient, int], int]) -> tuple[int, int]:
+    def _multiple(self, kind: str, argument: Quotient, make: Callable[[Quotient], int]) -> tuple[int, int]:
         """(generator, n): the argument is n times the generator's base.
 
         make: adds the generator of a new base, which is the argument over as much as has turned out to be needed.
@@ -239,22 +167,20 @@ class Transcendental:
         divisor = self._divisors[len(self._bases)]
         if divisor > _MAX_MULTIPLE:
             raise Unprovable(f"A multiple {divisor} of an argument.")
-        base = self._tower.product((argument, self._tower.number(Fraction(1, divisor))))
+        base = argument / divisor
         position = len(self._bases)
         self._bases.append((kind, base, -1))
-        self._bases[position] = (kind, base, make(base, divisor))
+        self._bases[position] = (kind, base, make(base))
         return self._bases[position][2], divisor
 
     # --- the circle -------------------------------------------------------------------------------------------------
 
     def circle(self, argument: Quotient) -> Circle:
         """(sin, cos) of an argument: sums by the addition theorem, multiples by powers of cos + i sin."""
-        t = self._tower
-        total: Circle = (t.number(0), t.number(1))
-        if not argument.numerator:
-            return total
-        for part in self._tower.summands(argument):
-            total = self._turn(total, self._circle_of_term(part))
+        total = self._tower.number(0), self._tower.number(1)
+        if argument.numerator:
+            for part in self._tower.summands(argument):
+                total = turned(total, self._circle_of_term(part))
         return total
 
     def _circle_of_term(self, value: Quotient) -> Circle:
@@ -263,41 +189,34 @@ class Transcendental:
             return known
         inverse = self._inverse_multiple(value)
         if inverse is not None:
-            return self._turned(*inverse)
+            return self._times(*inverse)
 
-        def make(base: Quotient, _divisor: int) -> int:
-            part = self._field.expression(base)
-            sine, cosine = sympy.sin(part, evaluate=False), sympy.cos(part, evaluate=False)
-            index = self._new("sin", sine, (base,), Sign(0, False))
-            square = 1 - self._tower.gens[index] ** 2
-            partner = self._tower.add_root(("cos", part), square, sign=0, kind="cos")
-            self._field.means(partner, cosine)
-            self._set_number(partner, cosine)
-            self._tower.signs.circles[index] = partner
-            unit = (Fraction(-1), Fraction(1))
-            self._tower.signs.ranges |= {index: unit, partner: unit}
-            if is_below_quarter(self._field, base):
-                for positive in (self._tower.gens[partner], *(1 + n * self._tower.gens[index] for n in (-1, 1))):
-                    self._tower.signs.declare(positive, Sign(1, True))
+        def make(base: Quotient) -> int:
+            t, angle = self._tower, self._field.expression(base)
+            sine, cosine = sympy.sin(angle, evaluate=False), sympy.cos(angle, evaluate=False)
+            index, partner = self._new_pair("sin", sine, "cos", cosine, (base,))
+            t.signs.circles[index] = partner
+            if self._is_between(base, -_QUARTER, _QUARTER):  # the cosine is > 0
+                for positive in (t.gens[partner], 1 - t.gens[index], 1 + t.gens[index]):
+                    t.signs.declare(positive, PLUS)
             return index
 
         index, multiple = self._multiple("circle", value, make)
-        t = self._tower
-        cosine = self._tower.signs.circles[index]
-        return self._turned((t.polynomial(t.gens[index]), t.polynomial(t.gens[cosine])), multiple)
+        return self._times((self._generator(index), self._generator(self._tower.signs.circles[index])), multiple)
 
     def _circle_of_number(self, value: Quotient) -> Circle | None:
         """(sin, cos) of a multiple of π/12, in square roots."""
         is_number = used(value.numerator) <= self._tower.signs.numbers.keys()
         turn = self._tower.ratio(value, self._field.enter(sympy.pi)) if is_number else None
-        if turn is None or 12 % turn.denominator:
-            return None
+        return None if turn is None or 12 % turn.denominator else self.circle_of_turn(turn)
+
+    def circle_of_turn(self, turn: Fraction) -> Circle:
+        """(sin, cos) of a multiple of π; the denominator of ``turn`` divides 12."""
         angle = sympy.pi * sympy.Rational(turn.numerator, turn.denominator)
         return self._field.enter(sympy.sin(angle)), self._field.enter(sympy.cos(angle))
 
     def _inverse_multiple(self, value: Quotient) -> tuple[Circle, int] | None:
         """((sin, cos) of an inverse function, n) where the value is n times it."""
-        t = self._tower
         terms = value.numerator.to_dict()
         if len(terms) != 1 or not value.denominator.is_constant():
             return None
@@ -305,72 +224,47 @@ class Transcendental:
         index = _single(monomial)
         if index is None or coefficient.q != 1 or abs(coefficient.p) > _MAX_MULTIPLE:
             return None
-        g = t.generators[index]
+        g = self._tower.generators[index]
         if g.kind == "am":
             return (self.jacobi("sn", *g.arguments), self.jacobi("cn", *g.arguments)), int(coefficient.p)
-        if g.kind not in _INVERSE:
+        if g.kind not in INVERSE:
             return None
-        u, one = g.arguments[0], t.number(1)
-        square = t.product((u, u))
-        other = t.root(t.sum((one, t.product((t.number(1 if g.kind == "atan" else -1), square)))))
-        if g.kind == "atan2":
-            x = g.arguments[1]
-            radius = t.root(t.sum((square, t.product((x, x)))))
-            pair = t.divide(u, radius), t.divide(x, radius)
-        elif g.kind == "atan":
-            pair = t.divide(u, other), t.divide(one, other)
-        else:
-            pair = (u, other) if g.kind == "asin" else (other, u)
-        return pair, int(coefficient.p)
+        sine, cosine = self.direction(index)
+        radius = self._tower.root(sine * sine + cosine * cosine)
+        return (sine / radius, cosine / radius), int(coefficient.p)
 
-    def _turned(self, pair: Circle, multiple: int) -> Circle:
+    def direction(self, index: int) -> Circle:
+        """A positive multiple of (sin, cos) of the angle that an inverse function is."""
+        g, one = self._tower.generators[index], self._tower.number(1)
+        u = g.arguments[0]
+        if g.kind in ("atan", "atan2"):
+            return u, (*g.arguments, one)[1]
+        other = self._tower.root(one - u * u)
+        return (u, other) if g.kind == "asin" else (other, u)
+
+    def _times(self, circle: Circle, multiple: int) -> Circle:
         """(sin, cos) of a multiple."""
-        sine, cosine = pair
-        if multiple < 0:
-            sine = self._tower.product((self._tower.number(-1), sine))
-        result = (self._tower.number(0), self._tower.number(1))
+        sine, cosine = circle if multiple > 0 else (-circle[0], circle[1])
+        result = self._tower.number(0), self._tower.number(1)
         for _ in range(abs(multiple)):
-            result = self._turn(result, (sine, cosine))
+            result = turned(result, (sine, cosine))
         return result
-
-    def _turn(self, a: Sequence[Quotient], b: Sequence[Quotient]) -> Circle:
-        """(sin, cos) of a sum."""
-        t = self._tower
-        minus = t.number(-1)
-        return (
-            t.sum((t.product((a[0], b[1])), t.product((a[1], b[0])))),
-            t.sum((t.product((a[1], b[1])), t.product((minus, a[0], b[0])))),
-        )
 
     # --- Jacobi's functions -----------------------------------------------------------------------------------------
 
     def jacobi(self, name: str, argument: Quotient, parameter: Quotient) -> Quotient:
         """sn, cn, dn: sn is a free generator, cn one with cn² = 1 − sn², and dn = √(1 − m sn²) > 0."""
-        t = self._tower
         key = _key("sn", argument, parameter)
-        if key not in self._elliptic:
-            self._elliptic[key] = self._new_elliptic(argument, parameter)
-        sine, cosine = self._elliptic[key]
+        if key not in self._pairs:
+            u, m = self._field.expression(argument), self._field.expression(parameter)
+            meanings = sn(u, m, evaluate=False), cn(u, m, evaluate=False)
+            self._pairs[key] = self._new_pair("sn", meanings[0], "cn", meanings[1], (argument, parameter))
+        sine, cosine = map(self._generator, self._pairs[key])
         if name != "dn":
-            return t.polynomial(t.gens[sine if name == "sn" else cosine])
-        s = t.polynomial(t.gens[sine])
-        square = t.sum((t.number(1), t.product((t.number(-1), parameter, s, s))))
-        below = t.signs.of(square.denominator)
-        above = square.numerator if below.value else t.times(square.numerator, square.denominator)
-        t.signs.declare(above, Sign(below.value or 1, True))  # where 0 ≤ m ≤ 1, which is a condition of each proof
-        return t.root(square)
-
-    def _new_elliptic(self, argument: Quotient, parameter: Quotient) -> tuple[int, int]:
-        t = self._tower
-        u, m = self._field.expression(argument), self._field.expression(parameter)
-        sine, cosine = structure.sn(u, m, evaluate=False), structure.cn(u, m, evaluate=False)
-        index = self._new("sn", sine, (argument, parameter), Sign(0, False))
-        partner = t.add_root(("cn", u, m), 1 - t.gens[index] ** 2, sign=0, kind="cn")
-        self._field.means(partner, cosine)
-        self._set_number(partner, cosine)
-        unit = (Fraction(-1), Fraction(1))
-        t.signs.ranges |= {index: unit, partner: unit}
-        return index, partner
+            return sine if name == "sn" else cosine
+        square = 1 - parameter * sine * sine
+        self._tower.declare(square)  # where 0 ≤ m ≤ 1, which is a condition of each proof
+        return self._tower.root(square)
 
     def weierstrass(self, name: str, arguments: tuple[Quotient, Quotient, Quotient]) -> Quotient:
         """℘ is a free generator, (L ℘')² = L² (4℘³ − g2 ℘ − g3) with a common denominator L of the invariants.
@@ -382,28 +276,21 @@ class Transcendental:
         if lowest is not None:
             return lowest if kind == name else t.number(0)
         key = _key(kind, *arguments)
-        if key not in self._weierstrass:
-            self._weierstrass[key] = self._new_weierstrass(kind, arguments)
-        value, rate = self._weierstrass[key]
-        if kind == name:
-            return t.polynomial(t.gens[value])
-        scale = t.times(arguments[1].denominator, arguments[2].denominator)
-        return t.divide(t.polynomial(t.gens[rate]), t.polynomial(scale))
+        if key not in self._pairs:
+            self._pairs[key] = self._new_weierstrass(kind, arguments)
+        value, rate = map(self._generator, self._pairs[key])
+        return value if kind == name else rate / t.polynomial(_scale(*arguments[1:]))
 
     def _lowest_root(self, g2: Quotient, g3: Quotient) -> Quotient | None:
         """℘(ω3): the root e < 0 of 4x³ − g2 x − g3 with 12e² > g2, where it is a rational function of the symbols."""
         t = self._tower
         index = t.add(f"root {len(t.generators)}", constant=True)
-        x = t.polynomial(t.gens[index])
-        cubic = t.sum(
-            (t.product((t.number(4), x, x, x)), t.product((t.number(-1), g2, x)), t.product((t.number(-1), g3)))
-        )
-        for factor, _ in cubic.numerator.factor()[1]:
+        x = self._generator(index)
+        for factor, _ in (4 * x**3 - g2 * x - g3).numerator.factor()[1]:
             parts = t.by_power(factor, index)
             if parts.keys() == {0, 1}:
                 e = t.quotient(-parts[0], parts[1])
-                slope = t.sum((t.product((t.number(12), e, e)), t.product((t.number(-1), g2))))
-                if t.sign(e) == Sign(-1, True) and t.sign(slope) == Sign(1, True):
+                if t.sign(-e) == PLUS and t.sign(12 * e * e - g2) == PLUS:
                     return e
         return None
 
@@ -411,18 +298,13 @@ class Transcendental:
         t, (_, g2, g3) = self._tower, arguments
         texts = [self._field.expression(part) for part in arguments]
         if kind == "wpinverse":
-            index = self._new(kind, wpinverse(*texts, evaluate=False), arguments, Sign(0, False))
+            index = self._new(kind, wpinverse(*texts, evaluate=False), arguments)
             return index, index
         value, rate = (WEIERSTRASS[kind + end](*texts, evaluate=False) for end in ("", "prime"))
-        index = self._new(kind, value, arguments, Sign(0, False))
-        p, scale = t.gens[index], t.times(g2.denominator, g3.denominator)
-        square = 4 * scale**2 * p**3
-        square -= scale * (g2.numerator * g3.denominator * p + g3.numerator * g2.denominator)
-        meaning = self._field.expression(Quotient(scale, t.one)) * rate
-        root = t.add_root((rate, scale), square, sign=0, kind=f"{kind}prime")
-        self._field.means(root, meaning)
-        self._set_number(root, meaning)
-        return index, root
+        index, scale = self._new(kind, value, arguments), t.polynomial(_scale(g2, g3))
+        p = self._generator(index)
+        square = (scale * scale * (4 * p**3 - g2 * p - g3)).numerator
+        return index, self._new_root(self._field.expression(scale) * rate, square, f"{kind}prime")
 
     # --- logarithms and the rest ------------------------------------------------------------------------------------
 
@@ -438,24 +320,23 @@ class Transcendental:
                 known = t.signs.of(factor)
                 if known.value:  # where it is 0, the whole has no logarithm
                     sign *= known.value ** int(power)
-                    weight = t.number(int(power) * (1 - 2 * side))
-                    total = t.sum((total, t.product((weight, self._logarithm_of_factor(factor * known.value)))))
+                    weight = int(power) * (1 - 2 * side)
+                    total = total + weight * self._logarithm_of_factor(factor * known.value)
                 else:
                     left[side] = t.times(left[side], t.raised(factor, int(power)))
-        total = t.sum((total, self._logarithm_of_number(number)))
+        total = total + self._logarithm_of_number(number)
         if left == [t.one, t.one] and sign > 0:
             return total
-        return t.sum((total, self.function("log", (t.quotient(left[0] * sign, left[1]),))))
+        return total + self.function("log", (t.quotient(left[0] * sign, left[1]),))
 
     def _logarithm_of_number(self, value: Fraction) -> Quotient:
         """ln of a positive fraction, over its primes where they are small."""
         t, total = self._tower, self._tower.number(0)
-        for whole, weight in ((value.numerator, 1), (value.denominator, -1)):
-            primes = fmpz(whole).factor() if whole.bit_length() <= _FACTORED_BITS else [(whole, 1)]
+        for integer, weight in ((value.numerator, 1), (value.denominator, -1)):
+            primes = fmpz(integer).factor() if integer.bit_length() <= _FACTORED_BITS else [(integer, 1)]
             for prime, power in primes:
                 if prime != 1:
-                    one = self.function("log", (t.number(int(prime)),))
-                    total = t.sum((total, t.product((t.number(weight * int(power)), one))))
+                    total = total + weight * int(power) * self.function("log", (t.number(int(prime)),))
         return total
 
     def _logarithm_of_factor(self, factor: fmpq_mpoly) -> Quotient:
@@ -467,64 +348,113 @@ class Transcendental:
             if g.kind == "exp":
                 return g.arguments[0]
             if g.kind == "root":
-                return t.product((t.number(Fraction(1, 2)), self.logarithm(g.arguments[0])))
+                return self.logarithm(g.arguments[0]) / 2
         return self.function("log", (t.polynomial(factor),))
 
     def function(self, name: str, arguments: tuple[Quotient, ...]) -> Quotient:
         """A free generator for a function of these arguments: the same arguments, the same generator."""
         key = _key(name, *arguments)
         if key not in self._functions:
-            same = same_as(name, arguments[0], self._field, self._known)
-            if same is not None:
-                return same
+            known = self._through_known(name, arguments[0]) if name in ("asin", "acos", "atan") else None
+            if known is not None:
+                return known
             make = FREE.get(name) or getattr(sympy, name)
-            meaning = make(*(self._field.expression(argument) for argument in arguments), evaluate=False)
-            sign = Sign(0, False)
-            if name in ("asin", "atan"):
-                sign = self._tower.sign(arguments[0])
-            elif name == "acos":
-                below = self._tower.sum(
-                    (self._tower.number(1), self._tower.product((self._tower.number(-1), *arguments)))
-                )
-                sign = Sign(1, self._tower.sign(below).strict)
-            elif name in _OF_ANGLE:
-                sign = self._tower.sign(arguments[FREE[name].moving - 1])
-            elif name in _POSITIVE:
-                sign = Sign(1, _POSITIVE[name] or self._tower.sign(arguments[0]).strict)
-            index = self._new(name, meaning, arguments, sign)
+            meaning = make(*map(self._field.expression, arguments), evaluate=False)
+            sign, signs = self._sign_of(name, arguments), self._tower.signs
+            self._functions[key] = index = self._new(name, meaning, arguments, sign)
             if name == "modulus":
-                self._tower.signs.declare(1 - self._tower.gens[index], Sign(1, True))
+                signs.declare(1 - self._tower.gens[index], PLUS)
             if name == "atan":
                 one_sided = sign.value if sign.strict else 0
                 low, high = 0 if one_sided > 0 else -1, 0 if one_sided < 0 else 1
-                self._tower.signs.turns[index] = Fraction(low, 2), Fraction(high, 2)
+                signs.turns[index] = Fraction(low, 2), Fraction(high, 2)
             if name in _RANGES:
-                self._tower.signs.ranges[index] = _RANGES[name]
-            self._functions[key] = index
-        return self._tower.polynomial(self._tower.gens[self._functions[key]])
+                signs.ranges[index] = _RANGES[name]
+        return self._generator(self._functions[key])
+
+    def _sign_of(self, name: str, arguments: tuple[Quotient, ...]) -> Sign:
+        """The sign of a function of these arguments."""
+        t, first = self._tower, arguments[0]
+        if name in ("asin", "atan"):
+            return t.sign(first)
+        if name == "acos":
+            return Sign(1, t.sign(1 - first).strict)
+        if name in _OF_ANGLE:
+            return t.sign(arguments[FREE[name].moving - 1])
+        return Sign(1, _POSITIVE[name] or t.sign(first).strict) if name in _POSITIVE else UNKNOWN
+
+    def _through_known(self, name: str, u: Quotient) -> Quotient | None:
+        """asin, acos or atan of ``u`` through the angle in it, or through a function that the field has already.
+
+        acos(cos w) = w, asin(−u) = −asin u, asin u + acos u = π/2, atan u + atan 1/u = ± π/2.
+        """
+        angle = self._angle_in(name, u)
+        if angle is not None:
+            return angle
+        opposite = self._known(name, -u)
+        if opposite is not None:
+            return (self._field.enter(sympy.pi) if name == "acos" else 0) - opposite
+        quarter, partner = Fraction(1, 2), self._known("acos" if name == "asin" else "asin", u)
+        if name == "atan":
+            sign = self._tower.sign(u)
+            partner = self._known("atan", 1 / u) if sign.strict and sign.value else None
+            quarter *= sign.value
+        return None if partner is None else quarter * self._field.enter(sympy.pi) - partner
 
     def _known(self, name: str, argument: Quotient) -> Quotient | None:
         index = self._functions.get(_key(name, argument))
-        return None if index is None else self._tower.polynomial(self._tower.gens[index])
+        return None if index is None else self._generator(index)
 
-    def _new(self, kind: str, meaning: sympy.Expr, arguments: tuple[Quotient, ...], sign: Sign) -> int:
-        constant = all(self._field.is_constant(argument) for argument in arguments)
+    def _angle_in(self, name: str, u: Quotient) -> Quotient | None:
+        """w of acos(cos w), asin(sin w), atan(tan w), where w lies in the range of the inverse function."""
+        for sine, cosine in self._tower.signs.circles.items():
+            (angle,) = self._tower.generators[sine].arguments
+            s, c = self._generator(sine), self._generator(cosine)
+            if not (u * c - s if name == "atan" else u - (c if name == "acos" else s)).numerator:
+                low, high = (Fraction(0), _HALF) if name == "acos" else (-_QUARTER, _QUARTER)
+                return angle if self._is_between(angle, low, high) else None
+        return None
+
+    def _is_between(self, angle: Quotient, low: Fraction, high: Fraction) -> bool:
+        """low ≤ angle ≤ high all over the domain, shown."""
+        return self._tower.sign(angle - low).value > 0 and self._tower.sign(high - angle).value > 0
+
+    # --- generators -------------------------------------------------------------------------------------------------
+
+    def _generator(self, index: int) -> Quotient:
+        return self._tower.polynomial(self._tower.gens[index])
+
+    def _new(self, kind: str, meaning: sympy.Expr, arguments: tuple[Quotient, ...], sign: Sign = UNKNOWN) -> int:
+        constant = all(map(self._field.is_constant, arguments))
         index = self._tower.add(
             meaning, constant=constant, sign=sign.value, strict=sign.strict, kind=kind, arguments=arguments
         )
-        self._field.means(index, meaning)
         self._set_number(index, meaning)
         if kind in _MONOTONE:
             self._declare_order(index)
         return index
+
+    def _new_root(self, meaning: sympy.Expr, square: fmpq_mpoly, kind: str) -> int:
+        """A root of either sign."""
+        index = self._tower.add_root(meaning, square, sign=0, kind=kind)
+        self._set_number(index, meaning)
+        return index
+
+    def _new_pair(
+        self, kind: str, sine: sympy.Expr, other: str, cosine: sympy.Expr, arguments: tuple[Quotient, ...]
+    ) -> tuple[int, int]:
+        """Generators s, c with s² + c² = 1."""
+        index = self._new(kind, sine, arguments)
+        partner = self._new_root(cosine, 1 - self._tower.gens[index] ** 2, other)
+        self._tower.signs.ranges |= {index: _UNIT, partner: _UNIT}
+        return index, partner
 
     def _declare_order(self, index: int) -> None:
         """Declares the order of the values of a monotone function at ordered constants."""
         t, g = self._tower, self._tower.generators[index]
         for other, before in enumerate(t.generators[:index]):
             if before.kind == g.kind and g.constant and before.constant:
-                minus = t.product((t.number(-1), before.arguments[0]))
-                sign = t.sign(t.sum((g.arguments[0], minus)))
+                sign = t.sign(g.arguments[0] - before.arguments[0])
                 if sign.value and sign.strict:
                     t.signs.declare(t.gens[index] - t.gens[other], Sign(sign.value * _MONOTONE[g.kind], True))
 
@@ -535,6 +465,11 @@ class Transcendental:
 
 def _key(name: str, *arguments: Quotient) -> tuple[str, ...]:
     return (name, *(str((argument.numerator, argument.denominator)) for argument in arguments))
+
+
+def _scale(g2: Quotient, g3: Quotient) -> fmpq_mpoly:
+    """A common denominator of the invariants."""
+    return g2.tower.times(g2.denominator, g3.denominator)
 
 
 def _single(monomial: Any) -> int | None:

@@ -27,7 +27,7 @@ from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Field, Regularity
 from heavytop.features.claims.algebra.ring import Quotient, Unprovable, used
 from heavytop.features.claims.algebra.signs import NUMBER_BITS, PLUS, value_of
-from heavytop.features.claims.algebra.statement import Domain, Flow, Place, Setting, Statement
+from heavytop.features.claims.algebra.statement import Domain, Flow, Point, Setting, Statement
 from heavytop.features.claims.algebra.structure import sign_of
 from heavytop.precision import shown
 
@@ -62,12 +62,12 @@ class Condition:
 class Region:
     """A field over one part of the domain, with what is known to vanish nowhere or on no open set there."""
 
-    def __init__(self, field: Field, setting: Setting, statement: Statement, places: Sequence[Place]) -> None:
+    def __init__(self, field: Field, setting: Setting, statement: Statement, sample_points: Sequence[Point]) -> None:
         self.field = field
         self._statement = statement
         self._setting = setting
         self._flow = statement.flow
-        self.places = [point for point in places if self._holds(point)]
+        self.sample_points = [point for point in sample_points if self._holds(point)]
         self._thin: dict[str, bool] = {}
         self._thin_for_each: dict[str, bool] = {}
         self._kept: dict[str, bool] = {}
@@ -76,9 +76,9 @@ class Region:
         self.regularity = Regularity(field, self.is_nowhere_zero)
         # what is not 0 where the flow keeps it so may part the domain
         self.everywhere = Regularity(field) if statement.flow is not None else self.regularity
-        self._arcs = Arcs(field, self.everywhere, self.places, self.is_connected)
+        self._arcs = Arcs(field, self.everywhere, self.sample_points, self.is_connected)
 
-    def _holds(self, point: Place) -> bool:
+    def _holds(self, point: Point) -> bool:
         a = self.field.assumptions
         value = point[a.variable] * a.variable_sign
         return value > 0 or (value == 0 and not (a.strict and a.variable_sign))
@@ -100,7 +100,7 @@ class Region:
         return self.field.tower.signs.of(p).strict or self._is_apart(p) or self.is_kept(p)
 
     def _is_apart(self, p: fmpq_mpoly) -> bool:
-        return bool(self._setting.relations) and self.field.never_zero_on_relations(p)
+        return self.field.never_zero_on_relations(p)
 
     def is_kept(self, p: fmpq_mpoly) -> bool:
         """p' = c p along the flow, with p and c continuous, off a set without interior: p keeps its sign."""
@@ -112,20 +112,20 @@ class Region:
 
     def _is_kept(self, p: fmpq_mpoly, flow: Flow) -> bool:
         try:
-            expression = self.field.expression(Quotient(p, self.field.tower.one))
+            expression = self.field.expression(self.field.tower.polynomial(p))
             if not expression.free_symbols & flow.state:
                 return False
             rate = flow.rate(expression)
             field = Field(self.field.assumptions, [expression, rate])
             divisors = list(field.tower.divisors.values())
             value = field.enter(expression)
-            cofactor = field.tower.divide(field.enter(rate), value)
+            cofactor = field.enter(rate) / value
         except Unprovable:
             return False
         regularity = Regularity(field)
         if regularity.obstacle(cofactor) or regularity.obstacle(value):
             return False
-        own = Region(field, self._setting, self._statement, self.places)
+        own = Region(field, self._setting, self._statement, self.sample_points)
         return all(own.is_zero_nowhere_dense(divisor) for divisor in divisors)
 
     def leaves(self, rate: sympy.Expr) -> str:
@@ -137,7 +137,7 @@ class Region:
             field = Field(self.field.assumptions, [rate, *self.field.assumptions.relations])
         except Unprovable as error:
             return error.cause
-        own = Region(field, self._setting, self._statement, self.places)
+        own = Region(field, self._setting, self._statement, self.sample_points)
         if not own.vanishes(rate) and not own.is_forced(rate, radical=False):
             return "its rate is not shown to be 0 there"
         divisor = next(own.divisors(forced=True), "")
@@ -173,7 +173,7 @@ class Region:
             return self._flow is None or self._is_nonzero_at_some_state(p, self._flow)
         if not self.is_connected(used(p)) or self.everywhere.obstacle_of_generators(used(p), analytic=True):
             return False
-        return any(self._is_nonzero_at(p, point) for point in self.places)
+        return any(self._is_nonzero_at(p, point) for point in self.sample_points)
 
     def _has_parameters(self, p: fmpq_mpoly) -> bool:
         inside = set().union(*(self.field.meaning(index).free_symbols for index in used(p)))
@@ -204,7 +204,7 @@ class Region:
     def _is_nonzero_at_some_state(self, p: fmpq_mpoly, flow: Flow) -> bool:
         """A polynomial that is not 0 all over |γ| = 1 is 0 on no open part of it."""
         try:
-            expression = self.field.expression(Quotient(p, self.field.tower.one)).xreplace(dict(flow.names))
+            expression = self.field.expression(self.field.tower.polynomial(p)).xreplace(dict(flow.names))
             values = {symbol: _SOME_STATE.get(str(symbol)) for symbol in expression.free_symbols}
             others = (Fraction(2 * n + 7, 3 * n + 5) for n in range(len(values)))
             return not evaluate(
@@ -213,7 +213,7 @@ class Region:
         except Unprovable:
             return False
 
-    def _is_nonzero_at(self, p: fmpq_mpoly, point: Place) -> bool:
+    def _is_nonzero_at(self, p: fmpq_mpoly, point: Point) -> bool:
         meanings = {index: self.field.meaning(index) for index in used(p)}
         try:
             balls = {index: evaluate(meaning, point, NUMBER_BITS) for index, meaning in meanings.items()}
@@ -324,7 +324,7 @@ class Region:
         """The radicand of a polynomial that is a root by itself; None of another."""
         tower, (index, *others) = self.field.tower, sorted(used(p))
         alone = not others and p == tower.gens[index] and tower.generators[index].kind == "root"
-        return tower.radicand(index) if alone else None
+        return tower.squares[index] if alone else None
 
     def _is_analytic(self, p: fmpq_mpoly) -> bool:
         """In what moves, over a domain in one piece."""
@@ -336,7 +336,7 @@ class Region:
         """True only where p is 0 all over the region for no values of the parameters."""
         flow, domain = self._statement.flow, self._statement.domain
         try:
-            e = self.field.expression(Quotient(p, self.field.tower.one))
+            e = self.field.expression(self.field.tower.polynomial(p))
         except Unprovable:
             return False
         if flow is not None:
@@ -356,7 +356,7 @@ class Region:
         if open_part is None and need.kind is ConditionKind.NONZERO:
             with suppress(Unprovable):
                 factors = self._factors(self.field.enter(need.expression).numerator)
-                parts = [self.field.expression(Quotient(f, self.field.tower.one)) for f in factors]
+                parts = [self.field.expression(self.field.tower.polynomial(f)) for f in factors]
                 alone = [part for part in parts if part.free_symbols <= parameters]
                 open_part = sympy.Mul(*(part for part in alone if not is_never_zero(part, self.field.assumptions)))
         if open_part is None or not open_part.free_symbols:
@@ -383,7 +383,7 @@ class Region:
                 )
             if not self._divisors[forced, text]:
                 try:
-                    yield str(self.field.expression(Quotient(p, self.field.tower.one)))
+                    yield str(self.field.expression(self.field.tower.polynomial(p)))
                 except Unprovable:
                     yield text
 
@@ -413,7 +413,7 @@ class Prover:
         self._fields: dict[tuple[object, ...], Field | None] = {}
         self._regions: dict[int, Region] = {}
         self._conditions: dict[object, tuple[Condition, ...]] = {}
-        self._places: dict[tuple[str, str], list[Place]] = {}
+        self._sample_points: dict[tuple[str, str], list[Point]] = {}
         self._met: dict[object, bool] = {}
 
     # --- fields -----------------------------------------------------------------------------------------------------
@@ -478,15 +478,15 @@ class Prover:
         if field is None:
             return None
         if id(field) not in self._regions:
-            self._regions[id(field)] = Region(field, self._setting, statement, self.places(statement))
+            self._regions[id(field)] = Region(field, self._setting, statement, self.sample_points(statement))
         return self._regions[id(field)]
 
-    def places(self, statement: Statement) -> list[Place]:
-        """Exact places in the domain, on all relations."""
+    def sample_points(self, statement: Statement) -> list[Point]:
+        """Exact sample points in the domain, on all relations."""
         key = (statement.domain.label + statement.domain.note, str(statement.domain.points))
-        if key not in self._places:
-            self._places[key] = list(self._setting.places(statement))
-        return self._places[key]
+        if key not in self._sample_points:
+            self._sample_points[key] = list(self._setting.sample_points(statement))
+        return self._sample_points[key]
 
     # --- proofs -----------------------------------------------------------------------------------------------------
 
@@ -525,10 +525,10 @@ class Prover:
         return None
 
     def _sample(self, statement: Statement) -> Condition:
-        places = self.places(statement)
-        if not places:
+        sample_points = self.sample_points(statement)
+        if not sample_points:
             return Condition(_SAMPLE, False, self._why_no_place(statement))
-        if any(self.is_defined(statement, point) for point in places):
+        if any(self.is_defined(statement, point) for point in sample_points):
             return Condition(_SAMPLE, True, "checked in balls")
         return Condition(_SAMPLE, False, "at no sample in the domain is every formula defined and real")
 
@@ -539,12 +539,12 @@ class Prover:
         if not any(all(need.is_met(sample) for need in setting.bodies) for sample in setting.samples):
             return "at no sample is each principal moment at most the sum of the others: no body has such moments"
         region = self._region(statement, statement.domain.sign, strict=False)
-        if region is not None and region.field.relations_exclude_each_other():
+        if region is not None and region.field.never_zero_on_relations():
             within = " within |gamma| = 1" if statement.flow is not None else ""
             return f"the relations exclude each other{within}: no motion lies on them"
         return _missed(statement, setting)
 
-    def is_defined(self, statement: Statement, point: Place) -> bool:
+    def is_defined(self, statement: Statement, point: Point) -> bool:
         """Whether every formula and the residual is certainly defined and real at a place."""
         formulas = statement.formulas
         needed = formulas.sampled or formulas.needs | formulas.angle_needs, frozenset(point.items())
@@ -573,17 +573,17 @@ class Prover:
     def _make_conditions(self, statement: Statement) -> list[Condition]:
         domain, f = statement.domain, statement.formulas
         ends = domain.holds_its_end
-        whole = self._region(statement, domain.sign, strict=bool(domain.sign) and not ends)
-        inner = self._region(statement, domain.sign, strict=True) if ends else whole
-        if whole is None or inner is None:
+        everywhere = self._region(statement, domain.sign, strict=bool(domain.sign) and not ends)
+        inner = self._region(statement, domain.sign, strict=True) if ends else everywhere
+        if everywhere is None or inner is None:
             return [Condition(_ALGEBRA, False, "the formulas are too large, or hold what it does not know")]
         # a function of first integrals alone is as constant as they are, continuous or not
         moving = [value for value in f.values if not _is_kept(value, statement)]
-        against = whole.obstacle(moving), inner.obstacle(f.attitude)
-        continuous = bool(f.values) and not any(against) and not whole.obstacle(f.values)
+        against = everywhere.obstacle(moving), inner.obstacle(f.attitude)
+        continuous = bool(f.values) and not any(against) and not everywhere.obstacle(f.values)
         needed = {
-            need: whole.discharge(need)
-            or (KEPT if _is_kept(need.expression, statement) and whole.is_met_for_each(need) else "")
+            need: everywhere.discharge(need)
+            or (KEPT if _is_kept(need.expression, statement) and everywhere.is_met_for_each(need) else "")
             for need in _sorted(f.needs | f.angle_needs)
         }
         for need, how in needed.items():
@@ -591,13 +591,13 @@ class Prover:
                 needed[need] = _AT_THE_END
             elif not how and continuous and inner.is_removable(need):
                 needed[need] = _REMOVABLE
-        conditions = [_condition(need, how, whole) for need, how in needed.items()]
+        conditions = [_condition(need, how, everywhere) for need, how in needed.items()]
         for text, values, obstacle in ((_CONTINUOUS, f.values, against[0]), (_ATTITUDE, f.attitude, against[1])):
             if values:
                 conditions.append(Condition(text, not obstacle, obstacle or "by the rules of composition"))
         if f.pole:
             conditions.append(Condition(f.pole, continuous, "removable in gamma" if continuous else "not shown"))
-        return [*conditions, *self._kept(statement, whole)]
+        return [*conditions, *self._kept(statement, everywhere)]
 
     def _kept(self, statement: Statement, region: Region) -> Iterable[Condition]:
         """The side conditions are invariant: their rates are combinations of them."""
@@ -646,7 +646,7 @@ def shortest(formula: sympy.Expr, setting: Setting, domain: Domain) -> sympy.Exp
         short = field.expression(field.enter(formula))
     except Unprovable:
         return formula
-    region = Region(field, setting, statement, list(setting.places(statement)))
+    region = Region(field, setting, statement, list(setting.sample_points(statement)))
     if sympy.count_ops(short) >= sympy.count_ops(formula) or next(region.divisors(forced=False), None) is not None:
         return formula
     return short

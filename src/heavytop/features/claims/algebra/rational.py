@@ -7,9 +7,9 @@ wherever none of the tower's ``divisors`` is 0.  The converse needs the roots to
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
-from math import isqrt, lcm
+from math import isqrt, lcm, prod
 from typing import Any
 
 from flint import Ordering, fmpq, fmpq_mpoly, fmpz, fmpz_mpoly_ctx, fmpz_mpoly_vec
@@ -57,9 +57,7 @@ def _as_sum(tower: Tower, p: fmpq_mpoly, index: int, depth: int) -> Quotient | N
         return None
     a, b = parts[0], parts[1]
     s = tower.signs.of(b).value
-    radicand = tower.radicand(index)
-    assert radicand is not None  # R is a root
-    norm = tower.reduce(tower.times(a, a) - tower.times(tower.times(b, b), radicand))
+    norm = tower.reduce(tower.times(a, a) - tower.times(tower.times(b, b), tower.squares[index]))
     if not s or tower.signs.of(a).value <= 0:
         return None
     d = _plain_root(tower, norm, any_sign=s > 0)
@@ -68,7 +66,7 @@ def _as_sum(tower: Tower, p: fmpq_mpoly, index: int, depth: int) -> Quotient | N
     halves = [_simpler_root(tower, (a + sign * d.numerator) / 2, depth - 1) for sign in (1, -1)]
     if halves[0] is None or halves[1] is None:
         return None
-    return tower.sum((halves[0], tower.product((tower.number(s), halves[1]))))
+    return halves[0] + halves[1] * s
 
 
 def _simpler_root(tower: Tower, p: fmpq_mpoly, depth: int) -> Quotient | None:
@@ -87,7 +85,7 @@ def _plain_root(tower: Tower, p: fmpq_mpoly, *, any_sign: bool = False) -> Quoti
         if power % 2:
             constant = constant * sign
             known = tower.known_root(factor * sign) if sign else None
-            is_nested = any(tower.radicand(i) is not None for i in used(factor))
+            is_nested = bool(tower.squares.keys() & used(factor))
             if not sign or (known is None and is_nested):
                 return None
         elif not sign:
@@ -100,7 +98,7 @@ def _plain_root(tower: Tower, p: fmpq_mpoly, *, any_sign: bool = False) -> Quoti
         result = tower.times(result, tower.raised(factor * sign, int(power) // 2))
         if power % 2:
             result = tower.times(result, tower.gens[tower.root_of(factor * sign)])
-    return tower.product((tower.polynomial(result), root))
+    return root * tower.polynomial(result)
 
 
 def _needs_no_sign(power: Any, any_sign: bool) -> bool:
@@ -110,23 +108,20 @@ def _needs_no_sign(power: Any, any_sign: bool) -> bool:
 
 def _through_conjugate(tower: Tower, p: fmpq_mpoly) -> Quotient | None:
     """√p = √(p q)/√q, for a root √q of the tower with p q the square of something plain: √(√2 − 1) = 1/√(√2 + 1)."""
-    for index in reversed(range(len(tower.generators))):
-        q = tower.radicand(index)
-        if q is None or tower.generators[index].kind != "root" or not tower.generators[index].strict:
+    for index, q in reversed(list(tower.squares.items())):
+        if tower.generators[index].kind != "root" or not tower.generators[index].strict:
             continue
-        if len(q) > _MAX_TERMS or not any(tower.radicand(i) is not None for i in used(q) & used(p)):
+        if len(q) > _MAX_TERMS or not tower.squares.keys() & used(q) & used(p):
             continue
         try:
             root = _plain_root(tower, tower.reduce(tower.times(p, q)))
         except Unprovable:
             continue
         if root is not None:
-            return tower.divide(root, tower.polynomial(tower.gens[index]))
+            return root / tower.polynomial(tower.gens[index])
     return None
 
 
-_MAX_QUOTIENT = 1_500
-"""Terms of numerator times denominator where a common factor is sought: the paper's claims need 600."""
 _FACTORED_BITS = 64
 
 
@@ -137,8 +132,6 @@ class Tower(PolynomialRing):
         super().__init__()
         self._roots: dict[str, int] = {}
         self.signs = Signs(self)
-        # what has been divided by so far, by its text: nothing is proven where one of them is 0
-        self.divisors: dict[str, fmpq_mpoly] = {}
 
     # --- generators -----------------------------------------------------------------------------------------------
 
@@ -146,7 +139,7 @@ class Tower(PolynomialRing):
         """The index of a new generator R with R² = ``square``, a polynomial in the generators so far."""
         constant = all(self.generators[i].constant for i in used(square))
         strict = kind == "root" and self.signs.of(square).strict
-        argument = Quotient(square, self.one)
+        argument = Quotient(square, self.one, self)
         index = self.add(meaning, constant=constant, sign=sign, strict=strict, kind=kind, arguments=(argument,))
         self.squares[index] = square
         number = self.signs.ball(square)
@@ -157,81 +150,12 @@ class Tower(PolynomialRing):
 
     # --- arithmetic -----------------------------------------------------------------------------------------------
 
-    def polynomial(self, numerator: fmpq_mpoly) -> Quotient:
-        """A polynomial as a quotient."""
-        return Quotient(self.reduce(numerator), self.one)
-
-    def number(self, value: Fraction | int) -> Quotient:
-        """A rational number as a quotient."""
-        return Quotient(self.context.constant(fmpq(value.numerator, value.denominator)), self.one)
-
     def summands(self, argument: Quotient) -> list[Quotient]:
         """The summands of the numerator, each over the denominator."""
         return [
             self.quotient(self.context.from_dict({monomial: coefficient}), argument.denominator)
             for monomial, coefficient in argument.numerator.to_dict().items()
         ]
-
-    def quotient(self, numerator: fmpq_mpoly, denominator: Any) -> Quotient:
-        """Reduced, with no root left in the denominator; raises Unprovable where that is 0."""
-        numerator, denominator = self.reduce(numerator), self.reduce(denominator)
-        degrees = denominator.degrees()
-        for index in sorted(self.squares, reverse=True):
-            if degrees[index] == 1:
-                parts = self.by_power(denominator, index)
-                conjugate = parts.get(0, self.context.constant(0)) - parts[1] * self.gens[index]
-                rational = self.reduce(self.times(denominator, conjugate))
-                if rational:
-                    numerator = self.reduce(self.times(numerator, conjugate))
-                    denominator, degrees = rational, rational.degrees()
-        if not denominator:
-            raise Unprovable("A denominator is identically 0.", "Check the formula, or the domain it is claimed on.")
-        if len(denominator) > 1 and len(numerator) * len(denominator) > _MAX_QUOTIENT:
-            raise Unprovable("A quotient of polynomials is too large.", "Split the claim into smaller ones.")
-        if not denominator.is_constant():
-            self.divisors.setdefault(str(denominator), denominator)
-        common = numerator.gcd(denominator) if numerator else denominator
-        numerator, denominator = numerator / common, denominator / common
-        lead = denominator.leading_coefficient()
-        return Quotient(numerator / lead, denominator / lead)
-
-    def sum(self, parts: Iterable[Quotient]) -> Quotient:
-        """The sum of quotients."""
-        total = self.number(0)
-        for part in parts:
-            if part.denominator == total.denominator:
-                total = self.quotient(total.numerator + part.numerator, total.denominator)
-            else:
-                left = self.times(total.numerator, part.denominator)
-                right = self.times(part.numerator, total.denominator)
-                total = self.quotient(left + right, self.times(total.denominator, part.denominator))
-        return total
-
-    def product(self, parts: Iterable[Quotient]) -> Quotient:
-        """The product of quotients."""
-        total = self.number(1)
-        for part in parts:
-            total = self.quotient(
-                self.times(total.numerator, part.numerator), self.times(total.denominator, part.denominator)
-            )
-        return total
-
-    def power(self, base: Quotient, exponent: int) -> Quotient:
-        """An integer power, by squaring."""
-        if exponent < 0:
-            return self.power(self.quotient(base.denominator, base.numerator), -exponent)
-        result, square = self.number(1), base
-        while exponent:
-            if exponent & 1:
-                result = self.product((result, square))
-            exponent >>= 1
-            if exponent:
-                square = self.product((square, square))
-        return result
-
-    def divide(self, a: Quotient, b: Quotient) -> Quotient:
-        """a / b."""
-        return self.product((a, self.power(b, -1)))
 
     # --- absolute values and roots ----------------------------------------------------------------------------------
 
@@ -249,11 +173,16 @@ class Tower(PolynomialRing):
         above, below = self.signs.of(value.numerator), self.signs.of(value.denominator)
         return Sign(above.value * below.value, above.strict)
 
+    def declare(self, value: Quotient, *, strict: bool = True) -> None:
+        """value > 0, or >= 0 where it is not strict."""
+        below = self.signs.of(value.denominator)
+        above = value.numerator if below.value else self.times(value.numerator, value.denominator)
+        self.signs.declare(above, Sign(below.value or 1, strict))
+
     def absolute(self, value: Quotient) -> Quotient:
         """|value|, factor by factor; a factor of unknown sign becomes a root of its square."""
-        return self.divide(
-            self.polynomial(self._absolute(value.numerator)), self.polynomial(self._absolute(value.denominator))
-        )
+        above, below = (self.polynomial(self._absolute(part)) for part in (value.numerator, value.denominator))
+        return above / below
 
     def _absolute(self, p: fmpq_mpoly) -> fmpq_mpoly:
         constant, factors = p.factor()
@@ -269,7 +198,7 @@ class Tower(PolynomialRing):
         square = self.times(value.numerator, value.denominator)
         if not square:
             return self.number(0)
-        return self.divide(self._root(square), self.polynomial(self._absolute(value.denominator)))
+        return self._root(square) / self.polynomial(self._absolute(value.denominator))
 
     def _root(self, p: fmpq_mpoly) -> Quotient:
         """√p: squares come out as absolute values, factors of known sign as roots of their own."""
@@ -291,7 +220,7 @@ class Tower(PolynomialRing):
             raise Unprovable(
                 "A square root of a negative number.", "Check the formula, or the domain it is claimed on."
             )
-        return self.product((self.polynomial(outside), *roots, self.root_of_number(abs(constant))))
+        return prod(roots, start=self.polynomial(outside)) * self.root_of_number(abs(constant))
 
     def _simplest_root(self, square: fmpq_mpoly) -> Quotient:
         """√square as a sum of simpler roots where there is one, else as a generator."""
@@ -307,11 +236,11 @@ class Tower(PolynomialRing):
 
     def root_of_number(self, value: Any) -> Quotient:
         """√(p/q) = √(p q)/q, over the primes of p q."""
-        whole = int(value.p) * int(value.q)
-        root = isqrt(whole)
-        if root * root == whole:
+        radicand = int(value.p) * int(value.q)
+        root = isqrt(radicand)
+        if root * root == radicand:
             return self.number(Fraction(root, int(value.q)))
-        primes = fmpz(whole).factor() if whole.bit_length() <= _FACTORED_BITS else [(whole, 1)]
+        primes = fmpz(radicand).factor() if radicand.bit_length() <= _FACTORED_BITS else [(radicand, 1)]
         result = self.one / fmpq(value.q)
         for prime, power in primes:
             result *= int(prime) ** (int(power) // 2)

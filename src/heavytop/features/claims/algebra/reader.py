@@ -24,9 +24,10 @@ import sympy
 from flint import arb, fmpq
 
 from heavytop.errors import InputError, quoted
-from heavytop.features.claims.algebra import structure
+from heavytop.features.claims.algebra import elliptic
 from heavytop.features.claims.algebra.conditions import ConditionKind, Need, condition
 from heavytop.features.claims.algebra.elliptic import FORMULAS
+from heavytop.features.claims.algebra.statement import TIME, Setting
 from heavytop.features.claims.algebra.structure import Defined
 from heavytop.precision import exact
 
@@ -34,7 +35,7 @@ _OF_ONE = ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "s
 FUNCTIONS: dict[str, tuple[Any, int]] = {
     **{name: (getattr(sympy, name), 1) for name in _OF_ONE},
     "atan2": (sympy.atan2, 2),
-    **{name: (getattr(structure, name), 2) for name in structure.NAMES},
+    **{name: (getattr(elliptic, name), 2) for name in elliptic.JACOBI},
     **FORMULAS,
 }
 _MAX_LENGTH = 10_000
@@ -232,10 +233,10 @@ class _Parser(Descent):
             )
         if base.expression == 0 and exponent < 0:
             raise self._error("a division by 0")
-        whole = (abs(int(exponent.p)) + 1) // int(exponent.q) or 1
+        factors = (abs(int(exponent.p)) + 1) // int(exponent.q) or 1
         n = base.size
         size = ExpressionBounds(
-            n.nodes + 1, n.bits * whole, n.degree * whole, comb(min(n.terms, _MAX_TERMS) + whole - 1, whole)
+            n.nodes + 1, n.bits * factors, n.degree * factors, comb(min(n.terms, _MAX_TERMS) + factors - 1, factors)
         )
         self._check(size)
         if exponent.q == 2:
@@ -313,21 +314,14 @@ def _multiplied(a: ExpressionBounds, b: ExpressionBounds) -> ExpressionBounds:
 
 
 Bound = tuple[sympy.Expr, sympy.Expr]
+Comparison = tuple[sympy.Expr, sympy.Expr, ConditionKind]
+"""left, right, and what left − right is."""
+SIGNS = {">": ConditionKind.POSITIVE, ">=": ConditionKind.NONNEGATIVE, "!=": ConditionKind.NONZERO}
+_OR = {"assume": ", formula >= formula, or formula != formula", "where of [quadrature]": ""}
 
 
-@dataclass(frozen=True, slots=True)
-class Assumed:
-    """The fields of :class:`~heavytop.features.claims.algebra.statement.Setting` of the same names."""
-
-    positive: tuple[sympy.Symbol, ...]
-    greater: tuple[tuple[sympy.Symbol, sympy.Expr], ...]
-    facts: tuple[sympy.Expr, ...]
-    ranges: tuple[tuple[sympy.Symbol, tuple[Fraction, Fraction]], ...]
-    weak: tuple[sympy.Expr, ...]
-
-
-def comparisons(text: str, where: str) -> list[tuple[str, str, bool]]:
-    """(larger, smaller, strictly) of ``formula > formula``, and of each link of a chain such as ``0 < k <= 1``.
+def comparisons(text: str, where: str) -> list[tuple[str, str, ConditionKind]]:
+    """(larger, smaller, kind) of ``formula > formula``, and of each link of a chain such as ``0 < k <= 1``.
 
     Raises InputError for anything else.
     """
@@ -336,47 +330,34 @@ def comparisons(text: str, where: str) -> list[tuple[str, str, bool]]:
     if len({sign[0] for sign in signs}) != 1 or not all(sides) or "=" in "".join(sides):
         raise InputError(f"{where}: {text[:60]!r} is not understood.", f"Write: formula > formula{_OR[where]}.")
     pairs = [pair if signs[0][0] == ">" else pair[::-1] for pair in pairwise(sides)]
-    return [(*pair, len(sign) == 1) for pair, sign in zip(pairs, signs, strict=True)]
+    return [(*pair, SIGNS[sign.replace("<", ">")]) for pair, sign in zip(pairs, signs, strict=True)]
 
 
-_OR = {"assume": ", formula >= formula, or formula != formula", "where of [quadrature]": ""}
-Sides = list[tuple[str, str]]
-
-
-def inequalities(texts: Iterable[str]) -> tuple[Sides, Sides, Sides]:
-    """Assumptions of ``assume``: (larger, smaller) of its strict comparisons and of the others, both sides of each !=.
-
-    Raises InputError for anything else.
-    """
-    above: Sides = []
-    at_least: Sides = []
-    apart: Sides = []
+def assumptions(texts: Iterable[str]) -> Iterator[tuple[str, str, ConditionKind]]:
+    """(left, right, kind) of the comparisons of ``assume``, and of each !=; raises InputError for anything else."""
     for text in texts:
         left, sign, right = (part.strip() for part in text.partition("!="))
         if not sign:
-            for larger, smaller, strictly in comparisons(text, "assume"):
-                (above if strictly else at_least).append((larger, smaller))
+            yield from comparisons(text, "assume")
         elif left and right and not set("<>=!") & {*left, *right}:
-            apart.append((left, right))
+            yield left, right, SIGNS[sign]
         else:
             raise InputError(f"assume: {text[:60]!r} is not understood.", "Write: formula != formula.")
-    return above, at_least, apart
 
 
 def assume(
-    bounds: Sequence[Bound],
+    compared: Iterable[Comparison],
     needs: Iterable[Need],
     moments: Iterable[sympy.Expr],
     symbols: Iterable[sympy.Symbol],
-    apart: Iterable[Bound] = (),
-    at_least: Sequence[Bound] = (),
-) -> Assumed:
-    """Consequences of left > right of each bound, from what these need to be real, and from positive moments.
-
-    apart: the sides of what is assumed to be unequal.  at_least: bounds with left >= right.
-    """
-    at_least = [*at_least, *(implied for bound in at_least for implied in _through_monotone(bound))]
-    bounds = [*bounds, *(implied for bound in bounds for implied in _through_monotone(bound))]
+) -> Setting:
+    """Consequences of what is compared, from what this needs to be real, and from positive moments."""
+    sides: dict[ConditionKind, list[Bound]] = {kind: [] for kind in ConditionKind}
+    for left, right, kind in compared:
+        sides[kind].append((left, right))
+    bounds, at_least = sides[ConditionKind.POSITIVE], sides[ConditionKind.NONNEGATIVE]
+    for pairs in (bounds, at_least):
+        pairs += [implied for pair in pairs for implied in _through_monotone(pair)]
     symbols = list(symbols)
     positive = tuple(symbol for symbol in symbols if symbol.is_positive)
     greater: list[tuple[sympy.Symbol, sympy.Expr]] = []
@@ -399,10 +380,11 @@ def assume(
     asked = sorted(needs, key=lambda need: need.text)
     facts += [need.expression for need in asked if need.kind is ConditionKind.POSITIVE]
     facts += [need.expression**2 for need in asked if need.kind is ConditionKind.NONZERO]
-    facts += [(left - right) ** 2 for left, right in apart]
+    facts += [(left - right) ** 2 for left, right in sides[ConditionKind.NONZERO]]
     weak = [need.expression for need in asked if need.kind is ConditionKind.NONNEGATIVE]
     weak += [left - right for left, right in at_least]
-    return Assumed(positive, tuple(greater), tuple(facts), tuple(_ranges([*bounds, *at_least])), tuple(weak))
+    ranges = tuple(_ranges([*bounds, *at_least]))
+    return Setting(TIME, positive, tuple(greater), facts=tuple(facts), ranges=ranges, weak=tuple(weak))
 
 
 _MONOTONE: dict[Any, tuple[int, Callable[[arb], arb], Callable[[arb], bool]]] = {
@@ -415,7 +397,7 @@ _MONOTONE: dict[Any, tuple[int, Callable[[arb], arb], Callable[[arb], bool]]] = 
     sympy.acos: (-1, arb.cos, lambda c: c > 0 and c < arb.pi()),
     sympy.sqrt: (1, lambda c: c * c, lambda c: c >= 0),
 }
-"""Of functions strictly monotone where they are real: 1 or −1, the inverse, and whether a number is a value."""
+"""Functions strictly monotone where they are real: 1 or −1, the inverse, and whether a number is a value."""
 
 
 def _through_monotone(bound: Bound) -> Iterator[Bound]:

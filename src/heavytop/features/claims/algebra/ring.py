@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import Any
 
-from flint import Ordering, fmpq_mpoly, fmpq_mpoly_ctx
+from flint import Ordering, fmpq, fmpq_mpoly, fmpq_mpoly_ctx
 
 from heavytop.errors import HeavyTopError
 
 SLOTS = 64
 _MAX_PRODUCT = 10_000
 """Terms of a product: the paper's claims need 95, and what needs much more does not end."""
+_MAX_QUOTIENT = 1_500
+"""Terms of numerator times denominator where a common factor is sought: the paper's claims need 600."""
 
 
 class Unprovable(HeavyTopError):
@@ -25,10 +28,53 @@ def used(p: fmpq_mpoly) -> set[int]:
 
 @dataclass(frozen=True, slots=True)
 class Quotient:
-    """numerator / denominator, reduced by its tower."""
+    """numerator / denominator, reduced by its tower; arithmetic with others of that tower, and with fractions.
+
+    Raises Unprovable where the result is too large, or is divided by 0.
+    """
 
     numerator: fmpq_mpoly
     denominator: Any
+    tower: PolynomialRing = field(compare=False, repr=False)
+
+    def __add__(self, other: Quotient | Fraction | int) -> Quotient:
+        t, b = self.tower, self._operand(other)
+        if self.denominator == b.denominator:
+            return t.quotient(self.numerator + b.numerator, b.denominator)
+        left, right = t.times(self.numerator, b.denominator), t.times(b.numerator, self.denominator)
+        return t.quotient(left + right, t.times(self.denominator, b.denominator))
+
+    def __mul__(self, other: Quotient | Fraction | int) -> Quotient:
+        t, b = self.tower, self._operand(other)
+        return t.quotient(t.times(self.numerator, b.numerator), t.times(self.denominator, b.denominator))
+
+    def __truediv__(self, other: Quotient | Fraction | int) -> Quotient:
+        b = self._operand(other)
+        return self * self.tower.quotient(b.denominator, b.numerator)
+
+    def __pow__(self, exponent: int) -> Quotient:
+        result, base = self.tower.number(1), self if exponent >= 0 else 1 / self
+        for bit in f"{abs(exponent):b}":
+            result = result * result
+            result = result * base if bit == "1" else result
+        return result
+
+    def __neg__(self) -> Quotient:
+        return Quotient(-self.numerator, self.denominator, self.tower)
+
+    def __sub__(self, other: Quotient | Fraction | int) -> Quotient:
+        return self + -self._operand(other)
+
+    def __rsub__(self, other: Fraction | int) -> Quotient:
+        return -self + other
+
+    def __rtruediv__(self, other: Fraction | int) -> Quotient:
+        return self._operand(other) / self
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def _operand(self, other: Quotient | Fraction | int) -> Quotient:
+        return other if isinstance(other, Quotient) else self.tower.number(other)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +105,8 @@ class PolynomialRing:
         self.generators: list[Generator] = []
         self.squares: dict[int, fmpq_mpoly] = {}
         self.one = self.context.constant(1)
+        # what has been divided by so far, by its text: nothing is proven where one of them is 0
+        self.divisors: dict[str, fmpq_mpoly] = {}
 
     def add(
         self,
@@ -75,14 +123,6 @@ class PolynomialRing:
             raise Unprovable(f"More than {SLOTS} independent quantities.", "Split the claim into smaller ones.")
         self.generators.append(Generator(meaning, constant, sign, strict, kind, arguments))
         return len(self.generators) - 1
-
-    def radicand(self, index: int) -> fmpq_mpoly | None:
-        """q of a root R² = q; None for a free generator."""
-        return self.squares.get(index)
-
-    def radicands(self) -> list[tuple[int, fmpq_mpoly]]:
-        """(R, q) of every root R² = q."""
-        return list(self.squares.items())
 
     def relations(self) -> list[fmpq_mpoly]:
         """R² − q for every root R = √q."""
@@ -121,3 +161,36 @@ class PolynomialRing:
             rest = (*monomial[:index], 0, *monomial[index + 1 :])
             parts.setdefault(int(monomial[index]), {})[rest] = coefficient
         return {power: self.context.from_dict(terms) for power, terms in parts.items()}
+
+    # --- quotients --------------------------------------------------------------------------------------------------
+
+    def polynomial(self, numerator: fmpq_mpoly) -> Quotient:
+        """A polynomial as a quotient."""
+        return Quotient(self.reduce(numerator), self.one, self)
+
+    def number(self, value: Fraction | int) -> Quotient:
+        """A rational number as a quotient."""
+        return Quotient(self.context.constant(fmpq(value.numerator, value.denominator)), self.one, self)
+
+    def quotient(self, numerator: fmpq_mpoly, denominator: Any) -> Quotient:
+        """Reduced, with no root left in the denominator; raises Unprovable where that is 0."""
+        numerator, denominator = self.reduce(numerator), self.reduce(denominator)
+        degrees = denominator.degrees()
+        for index in sorted(self.squares, reverse=True):
+            if degrees[index] == 1:
+                parts = self.by_power(denominator, index)
+                conjugate = parts.get(0, self.context.constant(0)) - parts[1] * self.gens[index]
+                rational = self.reduce(self.times(denominator, conjugate))
+                if rational:
+                    numerator = self.reduce(self.times(numerator, conjugate))
+                    denominator, degrees = rational, rational.degrees()
+        if not denominator:
+            raise Unprovable("A denominator is identically 0.", "Check the formula, or the domain it is claimed on.")
+        if len(denominator) > 1 and len(numerator) * len(denominator) > _MAX_QUOTIENT:
+            raise Unprovable("A quotient of polynomials is too large.", "Split the claim into smaller ones.")
+        if not denominator.is_constant():
+            self.divisors.setdefault(str(denominator), denominator)
+        common = numerator.gcd(denominator) if numerator else denominator
+        numerator, denominator = numerator / common, denominator / common
+        lead = denominator.leading_coefficient()
+        return Quotient(numerator / lead, denominator / lead, self)

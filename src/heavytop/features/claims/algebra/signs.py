@@ -18,7 +18,7 @@ from heavytop.features.claims.algebra.combinations import nonnegative_combinatio
 from heavytop.features.claims.algebra.ring import PolynomialRing, Unprovable, used
 
 NUMBER_BITS = 512
-"""Of the balls of generators that are numbers."""
+"""Working precision of the balls of generators that are numbers."""
 
 
 class Sign(NamedTuple):
@@ -369,7 +369,7 @@ class Signs:
                 for power, part in parts.items()
             )
         zero = self._ring.context.constant(0)
-        radicand = self._ring.radicand(index)
+        radicand = self._ring.squares.get(index)
         if degree == 1 and radicand is not None:
             yield self._of_root_sum(parts.get(0, zero), parts[1], radicand, g.sign)
         if degree == 2:
@@ -455,7 +455,7 @@ class Signs:
 
     def _by_squares(self, p: fmpq_mpoly) -> Sign:
         """With a generator g ≥ 0 written as R², where there is a root R of g."""
-        for root, square in self._ring.radicands():
+        for root, square in list(self._ring.squares.items()):
             (index, *others) = used(square) or {-1}
             # that there is a root does not make it real
             is_real = self._at_once(square).value > 0
@@ -502,7 +502,7 @@ class Signs:
             chosen += more
             near = near.union(*(used(fact) for fact, _ in more))
         for index in sorted(near):
-            g, square = self._ring.generators[index], self._ring.radicand(index)
+            g, square = self._ring.generators[index], self._ring.squares.get(index)
             is_real = square is None or index in used(p) or self._at_once(square).value > 0
             if g.sign and index not in self._forms.keys() - self._below_one and is_real:
                 chosen.append((self._ring.gens[index] * g.sign, g.strict))

@@ -11,7 +11,8 @@ import sympy
 from heavytop.features.claims.algebra.conditions import ConditionKind, Need, is_exactly_zero
 from heavytop.features.claims.algebra.fields import Assumptions, SolvedRelation
 
-Place = dict[sympy.Symbol, Fraction]
+TIME = sympy.Symbol("t", real=True)
+Point = dict[sympy.Symbol, Fraction]
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,34 +103,20 @@ class Statement:
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
-    """The setting of the statements of a claim.
+class Setting(Assumptions):
+    """The setting of the statements of a claim: what it assumes, and where to look for witnesses.
 
-    variable: the symbol that moves (t, or Ω2 in the general case).
     samples: exact parameter sets.  parts: names with expressions through which a residual may be written, such as γ3.
-    constants: the same for constant factors, such as k/2.  relations: what is 0 wherever the claim is made.
-    facts: expressions that are > 0.  weak: expressions that are >= 0.  nonzero: symbols that are not 0.
-    ranges: closed intervals of symbols.
+    constants: the same for constant factors, such as k/2.
     bodies: what the parameters have to meet for a body with the moments of the claim to exist.
-    solutions: of relations that can be solved.  solved: those that are put in, in the place of their relations.
-    parameters: symbols that are constant along every motion.
+    solutions: of relations that can be solved; those in ``solved`` are put in, in the place of their relations.
     """
 
-    variable: sympy.Symbol
-    positive: tuple[sympy.Symbol, ...]
-    samples: tuple[Mapping[sympy.Symbol, Fraction], ...]
-    greater: tuple[tuple[sympy.Symbol, sympy.Expr], ...] = ()
+    samples: tuple[Mapping[sympy.Symbol, Fraction], ...] = ()
     parts: Mapping[str, tuple[tuple[str, sympy.Expr], ...]] = field(default_factory=dict)
     constants: tuple[tuple[str, sympy.Expr], ...] = ()
-    relations: tuple[sympy.Expr, ...] = ()
-    facts: tuple[sympy.Expr, ...] = ()
-    weak: tuple[sympy.Expr, ...] = ()
-    nonzero: tuple[sympy.Symbol, ...] = ()
-    ranges: tuple[tuple[sympy.Symbol, tuple[Fraction, Fraction]], ...] = ()
     bodies: tuple[Need, ...] = ()
     solutions: tuple[SolvedRelation, ...] = ()
-    solved: tuple[SolvedRelation, ...] = ()
-    parameters: frozenset[sympy.Symbol] = frozenset()
 
     def with_solutions(self) -> Setting:
         """The setting with the solutions in the place of their relations."""
@@ -146,27 +133,15 @@ class Setting:
         weak: tuple[sympy.Expr, ...] = (),
     ) -> Assumptions:
         """The assumptions of the algebra on a domain where the variable has this sign (strict: and is not 0)."""
-        return Assumptions(
-            self.variable,
-            self.positive,
-            self.greater,
-            sign,
-            self.relations,
-            strict,
-            (*self.facts, *facts),
-            self.nonzero,
-            self.ranges,
-            (*self.weak, *weak),
-            self.solved,
-            self.parameters,
-        )
+        facts, weak = (*self.facts, *facts), (*self.weak, *weak)
+        return replace(self, variable_sign=sign, strict=strict, facts=facts, weak=weak)
 
     @property
     def zeros(self) -> tuple[sympy.Expr, ...]:
         """Expressions that are 0 wherever the claim is made."""
         return (*self.relations, *(solution.symbol - solution.value for solution in self.solved))
 
-    def places(self, statement: Statement) -> Iterator[Place]:
+    def sample_points(self, statement: Statement) -> Iterator[Point]:
         """Exact parameters of bodies, and points of the domain of ``statement``, that lie on all relations, proven."""
         for sample in self.samples:
             if not all(need.is_met(sample) for need in self.bodies):

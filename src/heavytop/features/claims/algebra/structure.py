@@ -8,6 +8,7 @@ from typing import Any
 
 import sympy
 
+from heavytop.features.claims.algebra.elliptic import dn
 from heavytop.features.claims.algebra.signs import PLUS, UNKNOWN, Sign, sum_of
 
 # Definitions kept as names, so that a chain of them is not expanded: symbols with a meaning, and their rates.
@@ -54,6 +55,11 @@ def rate_along(rates: Mapping[sympy.Symbol, sympy.Expr]) -> Callable[[sympy.Expr
     return rate
 
 
+def rationals(values: Mapping[sympy.Symbol, Fraction]) -> dict[sympy.Symbol, sympy.Rational]:
+    """Exact values for SymPy."""
+    return {symbol: sympy.Rational(value.numerator, value.denominator) for symbol, value in values.items()}
+
+
 def at_values(expression: sympy.Expr, values: Mapping[sympy.Symbol, sympy.Expr]) -> sympy.Expr:
     """The expression with these values, inside of definitions too."""
     known: dict[Defined, sympy.Expr] = {}
@@ -66,68 +72,6 @@ def at_values(expression: sympy.Expr, values: Mapping[sympy.Symbol, sympy.Expr])
         return e.subs(values, simultaneous=True) if e.free_symbols else e
 
     return put_in(expression)
-
-
-# Jacobi's functions of a real argument u and a parameter m = k², 0 ≤ m ≤ 1, as formulas of a claim.
-#
-# sn² + cn² = 1, dn² + m sn² = 1, dn > 0;  d/du sn = cn dn, cn' = −sn dn, dn' = −m sn cn  (DLMF 22.6.1, 22.13.1).
-
-
-NAMES = ("sn", "cn", "dn")
-
-
-class _Jacobi(sympy.Function):  # type: ignore[misc]
-    """Real and analytic in u; the parameter has no rate here: it does not move in any claim that is proven."""
-
-    nargs = 2
-    is_real = True
-
-    def fdiff(self, argindex: int = 1) -> sympy.Expr:
-        u, m = self.args
-        if argindex != 1:
-            return sympy.Function(f"rate_of_{type(self).__name__}_by_m", real=True)(u, m)
-        rates: dict[str, Any] = {
-            "sn": lambda: cn(u, m) * dn(u, m),
-            "cn": lambda: -sn(u, m) * dn(u, m),
-            "dn": lambda: -m * sn(u, m) * cn(u, m),
-        }
-        return rates[type(self).__name__]()
-
-
-class sn(_Jacobi):  # noqa: N801
-    """sn(u, m)."""
-
-    @classmethod
-    def eval(cls, u: sympy.Expr, m: sympy.Expr) -> sympy.Expr | None:
-        if u.is_zero:
-            return sympy.S.Zero
-        if u.could_extract_minus_sign():
-            return -cls(-u, m)
-        return sympy.sin(u) if m.is_zero else sympy.tanh(u) if m == 1 else None
-
-
-class cn(_Jacobi):  # noqa: N801
-    """cn(u, m)."""
-
-    @classmethod
-    def eval(cls, u: sympy.Expr, m: sympy.Expr) -> sympy.Expr | None:
-        if u.is_zero:
-            return sympy.S.One
-        if u.could_extract_minus_sign():
-            return cls(-u, m)
-        return sympy.cos(u) if m.is_zero else sympy.sech(u) if m == 1 else None
-
-
-class dn(_Jacobi):  # noqa: N801
-    """dn(u, m)."""
-
-    @classmethod
-    def eval(cls, u: sympy.Expr, m: sympy.Expr) -> sympy.Expr | None:
-        if u.is_zero or m.is_zero:
-            return sympy.S.One
-        if u.could_extract_minus_sign():
-            return cls(-u, m)
-        return sympy.sech(u) if m == 1 else None
 
 
 _BOUNDS = dict.fromkeys(("sin", "cos", "tanh", "sech", "sn", "cn"), Fraction(1)) | {"atan": Fraction(11, 7)}
@@ -221,9 +165,9 @@ class Names:
         parts = {part: self.put_into(part) for part in e.args}
         left = [part for part, named in parts.items() if named.free_symbols & self._state]
         done = [named for part, named in parts.items() if part not in left]
-        whole = sympy.Add(*left)
-        name = self._name(whole) if left else whole
-        return sympy.Add(*done, name) if name != whole else sympy.Add(*parts.values())
+        moving = sympy.Add(*left)
+        name = self._name(moving) if left else moving
+        return sympy.Add(*done, name) if name != moving else sympy.Add(*parts.values())
 
     def _name(self, e: sympy.Expr) -> sympy.Expr:
         if e not in self._names:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import os
+import re
 import signal
 import sys
 import tomllib
@@ -18,16 +18,16 @@ from typing import Any
 
 import msgspec
 
+from heavytop import files
 from heavytop.errors import HeavyTopError, InputError, invalid, meant, prefixed, quoted
 from heavytop.features.claims.audit.components import UserComponent
-from heavytop.features.claims.audit.context import ClaimFile
+from heavytop.features.claims.audit.context import ClaimFile, FileClaim
 from heavytop.features.claims.audit.guard import Answer, AuditEnded, in_time, limit_process
-from heavytop.features.claims.audit.judge import Assuming, Audit, Auditable, StatementVerdict, judge, verdict_of
+from heavytop.features.claims.audit.judge import Audit, Auditable, StatementVerdict, judge, verdict_of
 from heavytop.features.claims.audit.stability import UserStability
 from heavytop.features.claims.audit.user_claims import UserIntegral, UserMotion
 from heavytop.features.claims.audit.values import ValueClaim, ValueFile
 from heavytop.features.claims.library.entry import FOLDER, Entry, Verdict, file_of, library, split
-from heavytop.files import cache_folder
 from heavytop.guard import processors
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System, system
 
@@ -80,7 +80,7 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable | ValueC
     try:
         content = msgspec.convert(rest, ClaimFile)
     except (msgspec.ValidationError, RecursionError) as error:
-        raise InputError(f"{where}: {invalid(error)}.", _REMEDY) from None
+        raise InputError(f"{where}: {invalid(error, ClaimFile)}.", _REMEDY) from None
     if content.kind not in _TABLES:
         raise InputError(f"{where}: kind = {content.kind[:40]!r}.", f"Use {', '.join(_TABLES)} or value.")
     wanted, made = _TABLES[content.kind]
@@ -102,7 +102,13 @@ def _value_claim(table: Mapping[str, Any], entry: Entry | None, where: str) -> V
         with prefixed(where):
             return ValueClaim(msgspec.convert(table, ValueFile), entry)
     except (msgspec.ValidationError, RecursionError) as error:
-        raise InputError(f"{where}: {invalid(error)}.", f"Numbers are text, as they are printed. {_REMEDY}") from None
+        cause = re.sub(r"\bvalue\[(\d+)\](\.)?", _place, invalid(error, ValueFile))
+        raise InputError(f"{where}: {cause}.", f"Numbers are text, as they are printed. {_REMEDY}") from None
+
+
+def _place(match: re.Match[str]) -> str:
+    """``value 3: `` of ``value[2].``: the numbers of a file are counted from 1."""
+    return f"value {int(match[1]) + 1}" + (": " if match[2] else "")
 
 
 PAPER = ("ershkov-general", "ershkov-partial")
@@ -165,10 +171,11 @@ def audit_claim(
     deciding = would_decide(claim, about, rows, perf_counter() - began)
     why, solves = claim.explain(about, rows)
     constants = tuple((name, str(value)) for name, value in claim.setting.constants)
-    said = (claim.name, about.name, claim.source, rows, tuple(why), solves, constants, claim.kind, claim.entry)
-    unused = claim.unused if isinstance(claim, Assuming) else ()
+    heading = claim.name, about.name, claim.source
+    unused = claim.unused if isinstance(claim, FileClaim) else ()
     table = claim.content.integral if isinstance(claim, UserIntegral) else None
-    return Audit(*said, deciding, unused, tuple(table.where) if table else ())
+    where = tuple(table.where) if table else ()
+    return Audit(*heading, rows, tuple(why), solves, constants, claim.kind, claim.entry, deciding, unused, where)
 
 
 def _rows(
@@ -187,7 +194,7 @@ def would_decide(
 
     seconds: that the audit took; what would take more than :data:`_SEARCH` together is not tried.
     """
-    if not isinstance(claim, Assuming) or verdict_of(rows) != "undecided":
+    if not isinstance(claim, FileClaim) or verdict_of(rows) != "undecided":
         return ()
     missing = [c.assumption for row in rows for c in row.conditions if c.assumption and not c.discharged]
     deciding: list[tuple[str, str]] = []
@@ -280,7 +287,10 @@ def judged(entries: Iterable[Entry], *, anew: bool = False, done: Done = lambda:
         judged = None if anew else _kept(entry)
         if judged is None:
             judged, _ = audited(entry)
-            _keep(entry, judged)
+            with suppress(OSError, InputError):  # a cache that cannot be written is left out
+                path = _cached(entry)
+                path.parent.mkdir(parents=True, exist_ok=True)
+                files.replace(path, msgspec.json.encode(judged))
         done()
         return judged
 
@@ -291,24 +301,14 @@ def judged(entries: Iterable[Entry], *, anew: bool = False, done: Done = lambda:
 def _kept(entry: Entry) -> Judged | None:
     """The verdict in the cache on exactly this entry and this program."""
     try:
-        return msgspec.json.decode(_place(entry).read_bytes(), type=Judged)
+        return msgspec.json.decode(_cached(entry).read_bytes(), type=Judged)
     except (OSError, msgspec.DecodeError, msgspec.ValidationError):
         return None
 
 
-def _keep(entry: Entry, judged: Judged) -> None:
-    """Beside others that write the same at once; a cache that cannot be written is left out."""
-    path = _place(entry)
-    part = path.with_suffix(f".{os.getpid()}.part")
-    with suppress(OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_bytes(msgspec.json.encode(judged))
-        part.replace(path)
-
-
-def _place(entry: Entry) -> Path:
+def _cached(entry: Entry) -> Path:
     content = (FOLDER / f"{entry.id}.toml").read_bytes()
-    return cache_folder("claims") / f"{hashlib.sha256(_program() + content).hexdigest()}.json"
+    return files.cache_folder("claims") / f"{hashlib.sha256(_program() + content).hexdigest()}.json"
 
 
 @cache
@@ -333,13 +333,19 @@ def child() -> None:
     if hasattr(signal, "alarm"):
         signal.alarm(int(last))
     limit_process(int(seconds))
+    sys.stdout.buffer.write(msgspec.json.encode(answer(path, system_name)))
+
+
+def answer(path: str, system_name: str) -> Answer:
+    """The audit of a file, or the reason that there is none."""
     try:
-        answer = Answer(report=audit_claim(find_claim(path), system(system_name) if system_name else None))
+        claim = find_claim(path)
+        with prefixed(path):
+            return Answer(report=audit_claim(claim, system(system_name) if system_name else None))
     except HeavyTopError as error:
         # a path may hold bytes that are no characters
-        answer = Answer(error=(error.cause.encode(errors="replace").decode(), error.remedy))
+        return Answer(error=(error.cause.encode(errors="replace").decode(), error.remedy))
     except MemoryError:
-        answer = Answer(memory=True)
+        return Answer(memory=True)
     except RecursionError:
-        answer = Answer(depth=True)
-    sys.stdout.buffer.write(msgspec.json.encode(answer))
+        return Answer(depth=True)

@@ -20,12 +20,11 @@ from heavytop.features.claims.algebra.conditions import ConditionKind, Need, con
 from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.rational import forces_zero
 from heavytop.features.claims.algebra.reader import Formula, parse, symbol
-from heavytop.features.claims.algebra.statement import ALL, Flow, Formulas, Place, Setting, Statement
-from heavytop.features.claims.algebra.structure import at_values, rate_along
+from heavytop.features.claims.algebra.statement import ALL, TIME, Flow, Formulas, Point, Setting, Statement
+from heavytop.features.claims.algebra.structure import at_values, rate_along, rationals
 from heavytop.features.claims.audit.context import (
     DOMAINS,
     STATE,
-    TIME,
     ComponentTable,
     IntegralTable,
     needs_of,
@@ -115,11 +114,11 @@ class UserComponent(UserIntegral):
     def _at_start(self, e: sympy.Expr) -> sympy.Expr:
         return e.xreplace({x: part.expression for x, part in zip(STATE, self.start, strict=True)})
 
-    def _states(self, conditions: Sequence[sympy.Expr], parameters: Mapping[sympy.Symbol, Fraction]) -> list[Place]:
+    def _states(self, conditions: Sequence[sympy.Expr], parameters: Mapping[sympy.Symbol, Fraction]) -> list[Point]:
         """The start where it is rational at these parameters; states on the conditions where none is given."""
         if not self.start:
             return super()._states(conditions, parameters)
-        numbers = {x: sympy.Rational(value.numerator, value.denominator) for x, value in parameters.items()}
+        numbers = rationals(parameters)
         values = [part.expression.xreplace(numbers) for part in self.start]
         exact = [Fraction(int(value.p), int(value.q)) for value in values if value.is_Rational]
         return [dict(zip(STATE, exact, strict=True))] if len(exact) == len(values) else []
@@ -170,7 +169,7 @@ class UserComponent(UserIntegral):
         """All of them."""
         return [statement for statements, _ in self.groups(system) for statement in statements]
 
-    def _moves(self, system: System, sample: Place) -> bool:
+    def _moves(self, system: System, sample: Point) -> bool:
         """Whether u is not constant along the motion from the start."""
         rate = self._rate(system)
         first = rate(self.quantity.expression)
@@ -234,7 +233,8 @@ class UserComponent(UserIntegral):
         held = _through(self._u, self.quantity.expression, zeros, _rate_of_angle(name, omega))
         if held is None:
             raise InputError(f"The rate of {name} is no function of {self._u}.", f"Give {name} by its rate alone.")
-        return replace(symbol(held[0] / held[1]), needs=condition("/", (held[1], held[2])))
+        needs = condition("/", (held[1],)) | condition("/", (held[2],))
+        return replace(symbol(held[0] / held[1]), needs=needs)
 
     # --- in time ------------------------------------------------------------------------------------------------------
 

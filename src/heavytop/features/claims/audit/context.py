@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import combinations, pairwise
@@ -26,20 +27,21 @@ from heavytop.features.claims.algebra.conditions import (
 )
 from heavytop.features.claims.algebra.elliptic import FORMULAS
 from heavytop.features.claims.algebra.evaluate import evaluate
+from heavytop.features.claims.algebra.fields import Field
 from heavytop.features.claims.algebra.reader import FUNCTIONS as FUNCTION_NAMES
 from heavytop.features.claims.algebra.reader import (
-    Assumed,
-    Bound,
+    SIGNS,
+    Comparison,
     Formula,
     assume,
+    assumptions,
     comparisons,
-    inequalities,
     parse,
     symbol,
 )
 from heavytop.features.claims.algebra.ring import Unprovable
-from heavytop.features.claims.algebra.statement import AFTER, ALL, BEFORE, Domain, Setting
-from heavytop.features.claims.algebra.structure import rate_along
+from heavytop.features.claims.algebra.statement import AFTER, ALL, BEFORE, TIME, Domain, Setting
+from heavytop.features.claims.algebra.structure import rate_along, rationals
 from heavytop.features.claims.audit.statements import SYSTEMS
 from heavytop.features.claims.library.entry import Entry
 from heavytop.precision import exact
@@ -178,7 +180,7 @@ def sample_rows(parameters: Mapping[str, Sequence[str] | str]) -> list[dict[str,
 
 
 _ORDER = (0, 3, 4, 3, 1, 5, 4, 5, 2)
-"""Place of each entry, row by row, among I11, I22, I33, I12, I13, I23."""
+"""Position of each entry, row by row, among I11, I22, I33, I12, I13, I23."""
 _REMEDY = "Give 3 principal moments, 6 entries I11, I22, I33, I12, I13, I23 of the tensor, or 9, row by row."
 
 
@@ -228,17 +230,16 @@ def minors(inertia: Sequence[sympy.Expr | tuple[sympy.Expr, ...]]) -> tuple[symp
 
 
 def _principal_minors(matrix: sympy.Matrix) -> tuple[sympy.Expr, ...]:
-    places = (chosen for size in (1, 2, 3) for chosen in combinations(range(3), size))
-    return tuple(sympy.expand(matrix.extract(chosen, chosen).det()) for chosen in places)
+    indices = (chosen for size in (1, 2, 3) for chosen in combinations(range(3), size))
+    return tuple(sympy.expand(matrix.extract(chosen, chosen).det()) for chosen in indices)
 
 
-TIME = sympy.Symbol("t", real=True)
 STATE = sympy.symbols("Omega1:4 gamma1:4", real=True)
 RESERVED = {"t", "pi", *(FUNCTION_NAMES.keys() - FORMULAS.keys()), *(str(variable) for variable in STATE)}
 """Names that no parameter may have: an elliptic function is one only before a parenthesis."""
 _SAMPLE_BITS = 512
 _MOST_BITS = 6_640
-"""Of numerator and denominator of a number in a sample: 2000 digits."""
+"""Bits of numerator and denominator of a number in a sample: 2000 digits."""
 _OF_THE_TOP = "The moments, the weight, the centre of mass and k of a top are constant: use numbers and parameters."
 _OF_PARAMETERS = "Relations are between parameters; conditions on the state stand in where of [integral]."
 
@@ -252,7 +253,7 @@ class Context:
 
     names: dict[str, Formula]
     symbols: dict[str, sympy.Symbol]
-    assumed: Assumed
+    assumed: Setting
     samples: tuple[dict[sympy.Symbol, Fraction], ...]
     relations: tuple[sympy.Expr, ...]
     top: Parameters
@@ -311,11 +312,11 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
             raise InputError(f"The name {name!r} is a parameter and a definition.", "Rename one of them.")
         if name in reserved:
             raise InputError(f"The name {name!r} is taken.", f"Taken are {', '.join(sorted(reserved))}.")
-    compared = inequalities(content.assume)
-    above = compared[0]
+    texts = list(assumptions(content.assume))
     tensor = read_tensor(content.top.inertia)
     # the moments of inertia of a top are positive, said or not
-    positive = {left for left, right in above if right == "0"} | {text.strip() for text in tensor.diagonal}
+    positive = {left for left, right, kind in texts if right == "0" and kind is ConditionKind.POSITIVE}
+    positive |= {text.strip() for text in tensor.diagonal}
     symbols = {
         name: sympy.Symbol(name, positive=True) if name in positive else sympy.Symbol(name, real=True)
         for name in content.parameters
@@ -324,9 +325,9 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     names |= {"pi": symbol(sympy.pi), **{str(variable): symbol(variable) for variable in variables}}
     for name, text in content.definitions.items():
         names[name] = parse(text, names, f"definition of {name}")
-    sides = [[(parse(a, names, "assume"), parse(b, names, "assume")) for a, b in pairs] for pairs in compared]
-    bounds, at_least, unequal = ([(a.expression, b.expression) for a, b in pairs] for pairs in sides)
-    needs = needs_of(side for pairs in sides for link in pairs for side in link)
+    sides = [(parse(a, names, "assume"), parse(b, names, "assume"), kind) for a, b, kind in texts]
+    compared = [(a.expression, b.expression, kind) for a, b, kind in sides]
+    needs = needs_of(formula for a, b, _ in sides for formula in (a, b))
     top = content.top
     moments = [parse(text, names, "top.inertia") for text in tensor.texts]
     arm = [*three(top.centre, names, "top.centre"), parse(top.weight, names, "top.weight")]
@@ -344,7 +345,7 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     context = Context(
         names,
         symbols,
-        assume(bounds, needs, minors(inertia), symbols.values(), unequal, at_least),
+        assume(compared, needs, minors(inertia), symbols.values()),
         tuple(
             {symbols[name]: sample_number(value, name) for name, value in row.items()}
             for row in sample_rows(content.parameters)
@@ -358,8 +359,8 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
         frozenset() if rotor is None else rotor.needs,
         tuple(part.expression for part in carried) or None,
     )
-    _check_samples(context, bounds, at_least, unequal)
-    return replace(context, samples=(*context.samples, *_at_equality(context, bounds, at_least, unequal)))
+    _check_samples(context, compared)
+    return replace(context, samples=(*context.samples, *_at_equality(context, compared)))
 
 
 def sample_number(text: str, what: str) -> Fraction:
@@ -392,51 +393,59 @@ def _check_constant(where: str, formulas: Sequence[Formula], remedy: str, variab
             raise InputError(f"{where}: {text} depends on {', '.join(moving)}.", remedy)
 
 
-def _check_samples(context: Context, *compared: Sequence[Bound]) -> None:
+def _check_samples(context: Context, compared: Sequence[Comparison]) -> None:
     """Samples that break the claim's own assumptions would be false witnesses: raises InputError."""
     for sample in context.samples:
-        shown = ", ".join(f"{name} = {value}" for name, value in sample.items()) or "without parameters"
-        broken = next(_broken(context, sample, *compared), None)
+        values = ", ".join(f"{name} = {value}" for name, value in sample.items())
+        broken = next(_broken(context, sample, compared), None)
         if broken is not None:
-            raise InputError(f"The sample {shown} breaks the {written(broken)}.", "Change the sample.")
+            cause = f"The sample {values or 'without parameters'} breaks the {written(broken)}."
+            raise InputError(cause, "Change the sample.")
         for index, moment in enumerate(minors(context.top.inertia), 1):
-            if not _at(moment, sample) > 0:
-                full = isinstance(context.top.inertia[0], tuple)
-                what = "the tensor of inertia not positive definite" if full else f"I{index} not positive"
-                raise InputError(f"The sample {shown} makes {what}.", "Change the sample.")
+            if not (ball := _at(moment, sample)) > 0:
+                is_full = isinstance(context.top.inertia[0], tuple)
+                name = "The principal minor" if is_full else f"I{index} ="
+                at_sample = moment.subs(rationals(sample))
+                number = written(str(at_sample)) if at_sample.is_Rational else ball.str(6, radius=False)
+                got = f"; it is {number} at the sample {values}" if moment.free_symbols else ""
+                cause = f"{name} {written(str(moment))} of top.inertia must be positive{got}."
+                raise InputError(cause, _cure(context, moment, compared))
 
 
-def _broken(
-    context: Context,
-    sample: dict[sympy.Symbol, Fraction],
-    bounds: Sequence[Bound],
-    at_least: Sequence[Bound],
-    unequal: Sequence[Bound],
-) -> Iterator[str]:
+def _cure(context: Context, moment: sympy.Expr, compared: Sequence[Comparison]) -> str:
+    """The remedy for a moment that is not positive: no sample is one where no parameters make it so."""
+    others = [other for other in minors(context.top.inertia) if other != moment]
+    for facts in ((), others):
+        assumed = assume(compared, (), facts, context.symbols.values())
+        with suppress(Unprovable):
+            field_ = Field(assumed.assumptions(0), [moment])
+            if field_.tower.sign(field_.enter(-moment)).value > 0:
+                return "Change top.inertia: no values of the parameters make it positive."
+    return "Change the sample."
+
+
+def _broken(context: Context, sample: dict[sympy.Symbol, Fraction], compared: Sequence[Comparison]) -> Iterator[str]:
     """The assumptions and relations that a sample breaks."""
-    for a, b in bounds:
-        if not _at(a - b, sample) > 0:
-            yield f"assumption {a} > {b}"
-    for a, b in at_least:
-        if not _at(a - b, sample) > 0 and is_exactly_zero(a - b, sample) is not True:
-            yield f"assumption {a} >= {b}"
-    yield from (f"assumption {a} != {b}" for a, b in unequal if is_exactly_zero(a - b, sample) is not False)
+    for a, b, kind in compared:
+        is_met = kind is not ConditionKind.NONZERO and bool(_at(a - b, sample) > 0)
+        if not is_met and kind is not ConditionKind.POSITIVE:
+            is_met = is_exactly_zero(a - b, sample) is (kind is ConditionKind.NONNEGATIVE)
+        if not is_met:
+            yield f"assumption {a} {next(sign for sign in SIGNS if SIGNS[sign] is kind)} {b}"
     yield from (f"relation {zero} = 0" for zero in context.relations if is_exactly_zero(zero, sample) is False)
 
 
-def _at_equality(
-    context: Context, bounds: Sequence[Bound], at_least: Sequence[Bound], unequal: Sequence[Bound]
-) -> Iterator[dict[sympy.Symbol, Fraction]]:
+def _at_equality(context: Context, compared: Sequence[Comparison]) -> Iterator[dict[sympy.Symbol, Fraction]]:
     """Samples at which an assumption that allows equality has it, where a parameter stands alone on one side."""
-    for pair in at_least:
-        for parameter, other in (pair, pair[::-1]):
+    for *pair, kind in compared:
+        for parameter, other in (pair, pair[::-1]) if kind is ConditionKind.NONNEGATIVE else ():
             for sample in context.samples if parameter.is_Symbol else ():
-                value = other.subs({s: sympy.Rational(n.numerator, n.denominator) for s, n in sample.items()})
+                value = other.subs(rationals(sample))
                 if not value.is_Rational:
                     continue
                 at_end = {**sample, parameter: Fraction(int(value.p), int(value.q))}
                 moments = (_at(moment, at_end) for moment in minors(context.top.inertia))
-                if all(m > 0 for m in moments) and not any(_broken(context, at_end, bounds, at_least, unequal)):
+                if all(m > 0 for m in moments) and not any(_broken(context, at_end, compared)):
                     yield at_end
                     break
 
@@ -452,19 +461,14 @@ def _at(expression: sympy.Expr, sample: dict[sympy.Symbol, Fraction]) -> arb:
 
 def setting_of(context: Context, variable: sympy.Symbol) -> Setting:
     """The setting of a claim in this context."""
-    a = context.assumed
     relations = tuple(part for relation in context.relations for part in conditions_for_zero(relation))
     parameters = frozenset(context.symbols.values())
-    setting = Setting(
-        variable,
-        a.positive,
-        context.samples,
-        a.greater,
+    setting = replace(
+        context.assumed,
+        variable=variable,
         relations=relations,
-        facts=a.facts,
-        weak=a.weak,
-        ranges=a.ranges,
         parameters=parameters,
+        samples=context.samples,
         bodies=_body_needs(context.top.inertia),
     )
     known = replace(setting.assumptions(0), relations=())
@@ -623,7 +627,7 @@ def read_clock(content: ClaimFile, context: Context) -> Clock:
         raise InputError(f"[quadrature]: t = {text[:60]} does not move with {u}.", "Give t as a function of it.")
     where = "where of [quadrature]"
     links = [link for text in table.where for link in comparisons(text, where)]
-    if not all(strictly for *_, strictly in links):
+    if any(kind is not ConditionKind.POSITIVE for *_, kind in links):
         raise InputError(f"{where}: a bound of {u} is not a value of it.", "Write < and > in the place of <= and >=.")
     sides = [[parse(side, context.names, where) for side in link[:2]] for link in links]
     facts = tuple(above.expression - below.expression for above, below in sides)
@@ -655,6 +659,6 @@ def _end(fact: sympy.Expr, u: sympy.Symbol, sample: Mapping[sympy.Symbol, Fracti
     slope = sympy.diff(fact, u)
     if u in slope.free_symbols or slope == 0:
         return None
-    value = (u - fact / slope).subs({s: sympy.Rational(n.numerator, n.denominator) for s, n in sample.items()})
+    value = (u - fact / slope).subs(rationals(sample))
     value = sympy.expand(value)
     return Fraction(int(value.p), int(value.q)) if value.is_Rational else None

@@ -16,9 +16,10 @@ import msgspec
 
 from heavytop.errors import ExitCode, HeavyTopError, InputError, quoted
 from heavytop.features.claims.audit.judge import Audit
+from heavytop.guard import how_it_ended
 
 SECONDS = 20
-"""Of the processor: a claim is not refused because others use the machine."""
+"""Seconds of processor time: a claim is not refused because others use the machine."""
 _WALL = 6
 """Times as many by the clock, after which it is stopped whatever it does."""
 _BYTES = 3 << 30
@@ -90,11 +91,7 @@ def _no_memory(path: str) -> InputError:
 def _end_of(done: subprocess.CompletedProcess[bytes]) -> str:
     """How a process that gave no answer ended."""
     if done.returncode < 0:
-        try:
-            name = signal.Signals(-done.returncode).name
-        except ValueError:
-            name = f"signal {-done.returncode}"
-        return f"was killed by {name}"
+        return f"was killed {how_it_ended(done.returncode)}"
     last = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
     return f"ended without an answer, exit code {done.returncode}" + "".join(f": {line[:200]}" for line in last)
 

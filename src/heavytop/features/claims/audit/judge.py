@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol
 
 import msgspec
 import sympy
@@ -42,7 +42,7 @@ ABOUT = {
 """The subject of the formulas of each kind of claim."""
 _BITS = (192, 1024)
 _MOST_BITS = 300_000
-"""Of the exponent of a residual that is written as exact text: those of decimal text go up to 10^100000."""
+"""Bits of the exponent of a residual that is written as exact text: those of decimal text go up to 10^100000."""
 _LONGEST = 160
 
 
@@ -208,9 +208,9 @@ def _row(
     witness: Mapping[str, Any] | None = None,
 ) -> StatementVerdict:
     name, note = s.domain.label, s.domain.note
-    said = tuple(replace(c, text=written(c.text), reason=written(c.reason)) for c in conditions)
+    readable = tuple(replace(c, text=written(c.text), reason=written(c.reason)) for c in conditions)
     return StatementVerdict(
-        s.equation, s.component, s.branch, name, holds, written(residual), s.text, witness, note, said
+        s.equation, s.component, s.branch, name, holds, written(residual), s.text, witness, note, readable
     )
 
 
@@ -219,9 +219,9 @@ def _witnesses(
 ) -> Iterator[dict[str, Any]]:
     """Exact parameters and times in the domain, on all relations, where a ball of the residual excludes 0."""
     always = () if statement.flow is None else statement.flow.always
-    places = [v for v in prover.places(statement) if all(is_exactly_zero(zero, v) for zero in always)]
+    sample_points = [v for v in prover.sample_points(statement) if all(is_exactly_zero(zero, v) for zero in always)]
     for bits in precisions:
-        for values in places:
+        for values in sample_points:
             ball = _ball(statement.residual, values, bits)
             if ball is not None and not ball.contains(0) and prover.is_defined(statement, values):
                 value, radius = _texts(ball)
@@ -255,8 +255,8 @@ def _ball(residual: sympy.Expr, values: Mapping[sympy.Symbol, Fraction], bits: i
 
 
 def _bound(statement: Statement, prover: Prover) -> str:
-    places = [point for point in prover.places(statement) if prover.is_defined(statement, point)]
-    balls = [_ball(statement.residual, values, _BITS[-1]) for values in places]
+    sample_points = [point for point in prover.sample_points(statement) if prover.is_defined(statement, point)]
+    balls = [_ball(statement.residual, values, _BITS[-1]) for values in sample_points]
     bounds = [abs(ball).upper() for ball in balls if ball is not None]
     if not bounds:
         return "undefined at every sample point"
@@ -275,7 +275,7 @@ def _closed_form(statement: Statement, setting: Setting, field_: Field) -> str |
         residual = field_.enter(statement.residual)
         for name, part in (("", sympy.Integer(1)), *setting.parts.get(statement.branch, ())):
             value = field_.enter(part)
-            factor = field_.tower.divide(residual, value) if value.numerator else None
+            factor = residual / value if value.numerator else None
             if factor is not None and field_.is_constant(factor):
                 return _product_text(_constant_text(factor, setting, field_), name)
         text = str(field_.expression(residual))
@@ -287,7 +287,7 @@ def _closed_form(statement: Statement, setting: Setting, field_: Field) -> str |
 def _constant_text(factor: Quotient, setting: Setting, field_: Field) -> str:
     tower = field_.tower
     for name, constant in setting.constants:
-        ratio = tower.divide(factor, field_.enter(constant))
+        ratio = factor / field_.enter(constant)
         for number, sign in ((1, ""), (-1, "-")):
             if ratio == tower.number(number):
                 return f"{sign}({name})"
@@ -303,7 +303,7 @@ def _product_text(factor: str, name: str) -> str:
     return f"{factor}*{name}" if simple or re.fullmatch(r"-?\d+(/\d+)?", factor) else f"({factor})*{name}"
 
 
-# What can be audited: a claim as statements, and one of which more may be assumed.
+# What can be audited: a claim as statements.
 
 
 class Auditable(Protocol):
@@ -337,23 +337,4 @@ class Auditable(Protocol):
 
         rows: the verdicts about the system ``about``, so that they need not be found again.
         """
-        ...
-
-
-@runtime_checkable
-class Assuming(Auditable, Protocol):
-    """A claim with parameters, of which more may be assumed."""
-
-    @property
-    def unassumed(self) -> list[str]:
-        """Parameters of which the claim assumes nothing."""
-        ...
-
-    @property
-    def unused(self) -> tuple[str, ...]:
-        """Parameters that no formula holds."""
-        ...
-
-    def assuming(self, bound: str) -> Auditable:
-        """The claim with one assumption more; raises InputError where a sample breaks it."""
         ...

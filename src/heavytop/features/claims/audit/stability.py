@@ -19,8 +19,8 @@ from heavytop.errors import InputError
 from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.prover import Condition
 from heavytop.features.claims.algebra.ring import Unprovable
-from heavytop.features.claims.algebra.statement import ALL, Statement
-from heavytop.features.claims.audit.context import TIME
+from heavytop.features.claims.algebra.statement import ALL, TIME, Statement
+from heavytop.features.claims.algebra.structure import rationals
 from heavytop.features.claims.audit.judge import StatementVerdict, verdict_of
 from heavytop.features.claims.audit.user_claims import UserMotion
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
@@ -76,8 +76,8 @@ class UserStability(UserMotion):
         """Samples at which the opposite is proven in exact rationals."""
         p, y = self.context.parameters(about), self.motion.state
         at_once = Statement("", 1, "", replace(ALL, points=(Fraction(0),)), sympy.Integer(0), "")
-        for sample in self.setting.places(at_once):
-            numbers = {symbol: sympy.Rational(value.numerator, value.denominator) for symbol, value in sample.items()}
+        for sample in self.setting.sample_points(at_once):
+            numbers = rationals(sample)
             exact = [e.xreplace(numbers) for e in (*p.inertia, *p.moment, *y)]
             if not all(value.is_Rational for value in exact):
                 continue

@@ -127,7 +127,7 @@ def motion_statements(motion: ClaimedMotion, p: Parameters, system: System) -> I
 
 
 def _turning(motion: ClaimedMotion, omega: Sequence[sympy.Expr]) -> Iterator[tuple[sympy.Expr, str]]:
-    """What is 0 where a quaternion or a matrix is the attitude: its own identities, and ξ' = ξ × Ω."""
+    """Residuals that are 0 where a quaternion or a matrix is the attitude: its own identities, and ξ' = ξ × Ω."""
     if motion.turned:
         yield from motion.turned
         xi = motion.attitude[:3]

@@ -24,11 +24,10 @@ from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.prover import shortest
 from heavytop.features.claims.algebra.reader import Formula, parse
 from heavytop.features.claims.algebra.ring import Unprovable
-from heavytop.features.claims.algebra.statement import AFTER, ALL, Flow, Formulas, Place, Setting, Statement
-from heavytop.features.claims.algebra.structure import Names, rate_along
+from heavytop.features.claims.algebra.statement import AFTER, ALL, TIME, Flow, Formulas, Point, Setting, Statement
+from heavytop.features.claims.algebra.structure import Names, rate_along, rationals
 from heavytop.features.claims.audit.context import (
     STATE,
-    TIME,
     ClaimedMotionTable,
     ClaimFile,
     Clock,
@@ -233,7 +232,7 @@ def states_on(
     parameters: Mapping[sympy.Symbol, Fraction],
 ) -> Iterator[dict[sympy.Symbol, Fraction]]:
     """Rational values of ``variables`` where polynomial ``conditions`` are 0 at these parameters; none if not found."""
-    numbers = {symbol: sympy.Rational(value.numerator, value.denominator) for symbol, value in parameters.items()}
+    numbers = rationals(parameters)
     # divisors that are 0 there are refused where the state is checked
     equations = [
         # one zero of sin u is as good as another
@@ -266,25 +265,27 @@ class _Search:
         if not equations:
             yield from self._filled(known, depth)
             return
-        solved = self._linear(equations)
-        if solved is not None:
-            yield from self._put(*solved, equations, known, depth)
+        for x, value, deeper in self._choices(equations, depth):
+            reduced = [sympy.expand(equation.subs(x, value)) for equation in equations]
+            values = {symbol: expression.subs(x, value) for symbol, expression in known.items()}
+            yield from self._solve(reduced, {**values, x: value}, depth + deeper)
+
+    def _choices(self, equations: Sequence[sympy.Expr], depth: int) -> Iterator[tuple[sympy.Symbol, sympy.Expr, int]]:
+        """Values of a variable that solve an equation or make it simpler, each with how many are only tried."""
+        if solved := self._linear(equations):
+            yield (*solved, 0)
             return
         shortest = min(equations, key=lambda equation: (len(equation.free_symbols), str(equation)))
         for factor, _ in sympy.factor_list(shortest)[1]:
-            others = [factor, *(equation for equation in equations if equation is not shortest)]
-            if factor != shortest and self._linear([factor]) is not None:
-                yield from self._solve(others, known, depth)
-                continue
             symbols = [x for x in self._variables if x in factor.free_symbols]
-            if len(symbols) == 1:
-                for value in sympy.Poly(factor, symbols[0]).ground_roots():
-                    yield from self._put(symbols[0], value, others, known, depth)
-                continue
-            # what is left is to be as simple as can be: the variable of the highest power gets a value first
-            x = max(symbols, key=lambda symbol: (sympy.degree(factor, symbol), str(symbol)))
-            for index in range(len(_VALUES)):
-                yield from self._put(x, _VALUES[(index + depth) % len(_VALUES)], others, known, depth + 1)
+            if solved := self._linear([factor]):
+                yield (*solved, 0)
+            elif len(symbols) == 1:
+                yield from ((symbols[0], root, 0) for root in sympy.Poly(factor, symbols[0]).ground_roots())
+            else:
+                # what is left is to be as simple as can be: the variable of the highest power gets a value first
+                x = max(symbols, key=lambda symbol: (sympy.degree(factor, symbol), str(symbol)))
+                yield from ((x, _VALUES[(index + depth) % len(_VALUES)], 1) for index in range(len(_VALUES)))
 
     def _linear(self, equations: Sequence[sympy.Expr]) -> tuple[sympy.Symbol, sympy.Expr] | None:
         """A variable that one of the equations gives as a polynomial in the others."""
@@ -295,18 +296,6 @@ class _Search:
                     if p.degree() == 1 and p.nth(1).is_number:
                         return x, -p.nth(0) / p.nth(1)
         return None
-
-    def _put(
-        self,
-        x: sympy.Symbol,
-        value: sympy.Expr,
-        equations: Sequence[sympy.Expr],
-        known: Mapping[sympy.Symbol, sympy.Expr],
-        depth: int,
-    ) -> Iterator[dict[sympy.Symbol, Fraction]]:
-        reduced = [sympy.expand(equation.subs(x, value)) for equation in equations]
-        values = {symbol: expression.subs(x, value) for symbol, expression in known.items()}
-        yield from self._solve(reduced, {**values, x: value}, depth)
 
     def _filled(self, known: Mapping[sympy.Symbol, sympy.Expr], depth: int) -> Iterator[dict[sympy.Symbol, Fraction]]:
         """With values for what is free: of either sign, and of several sizes."""
@@ -394,14 +383,14 @@ class UserIntegral(FileClaim):
         """The formulas that are 0 where the claim is made."""
         return (*self.where, self.value) if self.kind == "relation" else self.where
 
-    def _states(self, conditions: Sequence[sympy.Expr], parameters: Mapping[sympy.Symbol, Fraction]) -> list[Place]:
+    def _states(self, conditions: Sequence[sympy.Expr], parameters: Mapping[sympy.Symbol, Fraction]) -> list[Point]:
         """The states of the file; without them states of our own, on the conditions where such are found."""
         states = _numbers(self._table.states or _STATES)
         if self._table.states is not None:
             return states
         needs = needs_of([self.value, *self.where])
 
-        def serves(state: Place) -> bool:
+        def serves(state: Point) -> bool:
             point = {**parameters, **state}
             return all(is_exactly_zero(c, point) for c in conditions) and all(need.is_met(point) for need in needs)
 
@@ -486,7 +475,7 @@ class UserIntegral(FileClaim):
         return [], tuple(name for name, rows in judged.items() if verdict_of(rows) == "holds")
 
 
-def _numbers(states: Sequence[Sequence[str]]) -> list[Place]:
+def _numbers(states: Sequence[Sequence[str]]) -> list[Point]:
     """The states of a file, exactly."""
     return [
         {symbol: sample_number(text, f"states: {symbol}") for symbol, text in zip(STATE, values, strict=True)}

@@ -176,6 +176,7 @@ class Figure:
     """One published number, read.
 
     time_text: as the file has it.  tolerance: that of the source; None for half a unit of the last digit.
+    place: in the file, as errors name it.
     """
 
     time: Fraction
@@ -185,6 +186,7 @@ class Figure:
     number: PrintedNumber
     tolerance: Fraction | None
     tolerance_text: str = ""
+    place: str = ""
 
     @property
     def allowed(self) -> Fraction:
@@ -232,30 +234,30 @@ class ValueClaim:
     entry: Entry | None = None
     kind: str = "value"
     figures: tuple[Figure, ...] = field(init=False)
-    given: tuple[HeavyTop | Body, State] = field(init=False)
+    motion: tuple[HeavyTop | Body, State] = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "figures", tuple(_figures(self.content.value)))
-        object.__setattr__(self, "given", _given(self.content))
+        object.__setattr__(self, "motion", _read_motion(self.content))
 
     def about(self, asked: System | None) -> System:
         """The system asked for, else the file's, else `heavy_gyrostat` where there is a rotor, else `heavy_top`.
 
         Raises InputError where the file names another one, or the system does not admit the body.
         """
-        usual = HEAVY_TOP if self.given[0].rotor is None else HEAVY_GYROSTAT
+        usual = HEAVY_TOP if self.motion[0].rotor is None else HEAVY_GYROSTAT
         about = of_file(asked, self.content.system, usual)
-        require_no_other_rotor(about, self.given[0])
+        require_no_other_rotor(about, self.motion[0])
         return about
 
     def rows(self, about: System) -> tuple[StatementVerdict, ...]:
         """A verdict on each number, in the order of the file; raises InputError for a quantity that is not known."""
-        motion = _KnownNumbers(*self.given, about)
+        motion = _KnownNumbers(*self.motion, about)
         motion.require(self.figures)
         try:
             motion.require_handy(self.figures)
         except OutOfReach as error:
-            return tuple(_open_row(figure, "not known", f"{error.cause} {error.remedy}") for figure in self.figures)
+            return tuple(_row(figure, None, "not known", f"{error.cause} {error.remedy}") for figure in self.figures)
         verdicts: dict[Figure, StatementVerdict] = {}
         groups: dict[tuple[Fraction, str], list[Figure]] = {}
         for figure in self.figures:
@@ -269,27 +271,24 @@ def _figures(tables: Sequence[ValueTable]) -> Iterator[Figure]:
     """The numbers of a file; raises InputError for an invalid one, and where one stands twice."""
     seen: dict[tuple[Fraction, str, int], int] = {}
     for index, table in enumerate(tables, 1):
-        where = f"value {index}"
-        time = _number(table.time, f"{where}: time")
+        place = f"value {index}"
+        time = _number(table.time, f"{place}: time")
         size = SIZES.get(table.quantity, 1)
         component = table.component or 1
         if component > size or (table.component is None and size > 1):
             lacks = "of a component that is not named" if table.component is None else f"has no component {component}"
-            raise InputError(f"{where}: {table.quantity[:40]} {lacks}.", f"Its components are 1 to {size}.")
+            raise InputError(f"{place}: {table.quantity[:40]} {lacks}.", f"Its components are 1 to {size}.")
         subject = time, table.quantity, component
         if seen.setdefault(subject, index) != index:
-            raise InputError(
-                f"{where}: {table.quantity[:40]} {component} at t = {table.time[:40]} stands in value "
-                f"{seen[subject]} already.",
-                "Give each number once.",
-            )
-        tolerance = None if table.tolerance is None else _number(table.tolerance, f"{where}: tolerance")
+            repeated = f"{table.quantity[:40]} {component} at t = {table.time[:40]}"
+            raise InputError(f"{place}: {repeated} stands in value {seen[subject]} already.", "Give each number once.")
+        tolerance = None if table.tolerance is None else _number(table.tolerance, f"{place}: tolerance")
         if tolerance is not None and tolerance < 0:
-            raise InputError(
-                f"{where}: the tolerance {table.tolerance} is negative.", "Give it as 1e-10, or not at all."
-            )
-        number = PrintedNumber.read(table.number, f"{where}: number")
-        yield Figure(time, table.time.strip(), *subject[1:], number, tolerance, (table.tolerance or "").strip())
+            cause = f"{place}: tolerance must not be negative; got {quoted(str(table.tolerance))[1:-1]}."
+            raise InputError(cause, "Give it as 1e-10, or not at all.")
+        number = PrintedNumber.read(table.number, f"{place}: number")
+        tolerance_text = (table.tolerance or "").strip()
+        yield Figure(time, table.time.strip(), *subject[1:], number, tolerance, tolerance_text, place)
 
 
 def _number(text: str, what: str) -> Fraction:
@@ -297,7 +296,7 @@ def _number(text: str, what: str) -> Fraction:
         return exact(text)
 
 
-def _given(content: ValueFile) -> tuple[HeavyTop | Body, State]:
+def _read_motion(content: ValueFile) -> tuple[HeavyTop | Body, State]:
     """The body and its start; raises InputError for an invalid one."""
     if (content.top is None) == (content.body is None):
         raise InputError(
@@ -331,9 +330,9 @@ def _rows_of(group: Sequence[Figure], motion: _KnownNumbers) -> list[StatementVe
         except OutOfReach as error:
             missing = f"{error.cause} {error.remedy}".strip()
             trials = [_FEWEST_BITS] if bits == _FIRST_BITS else []
-    if judged is None:
-        return [_open_row(figure, motion.method, missing) for figure in group]
-    return [_row(figure, judgement, motion.method, missing) for figure, judgement in zip(group, judged, strict=True)]
+    judgements: Sequence[Judgement | None] = judged or [None] * len(group)
+    pairs = zip(group, judgements, strict=True)
+    return [_row(figure, judgement, motion.method, missing) for figure, judgement in pairs]
 
 
 def _judged(group: Sequence[Figure], known: Sequence[Fraction | arb]) -> list[Judgement]:
@@ -352,16 +351,33 @@ def _judged(group: Sequence[Figure], known: Sequence[Fraction | arb]) -> list[Ju
     return min(same, other, key=rank)
 
 
-def _row(figure: Figure, judged: Judgement, method: str, missing: str) -> StatementVerdict:
-    """The row of a number that balls were found for; missing: why none are narrower."""
-    value, wide = _texts(judged.middle, judged.wide, figure.number.digits + _MORE_DIGITS)
-    figures = _said(figure) | {"digits_right": judged.right, "proven": {"value": value, "radius": wide}}
-    witness = None
-    if judged.holds is False:
+def _row(figure: Figure, judged: Judgement | None, method: str, missing: str) -> StatementVerdict:
+    """The row of a number; missing: why no balls were found for it, or none that are narrower."""
+    name = figure.quantity if figure.quantity not in SIZES else f"{figure.quantity} {figure.component}"
+    allowed = "half a unit of the last digit" if figure.tolerance is None else figure.tolerance_text
+    figures: dict[str, Any] = {"printed": figure.number.text}
+    figures |= {} if figure.tolerance is None else {"tolerance": figure.tolerance_text}
+    figures["digits_printed"] = figure.number.digits
+    residual, witness = missing, None
+    if judged is not None:
+        value, wide = _texts(judged.middle, judged.wide, figure.number.digits + _MORE_DIGITS)
+        figures |= {"digits_right": judged.right, "proven": {"value": value, "radius": wide}}
+        residual = _off(judged) + (f"; {missing}" if judged.holds is None else "")
+    if judged is not None and judged.holds is False:
         apart = _texts(figure.number.value - judged.middle, judged.wide, _WITNESS_DIGITS)
         witness = {"parameters": {}, "t": figure.time_text, "value": apart[0], "radius": apart[1]}
-    residual = _off(judged) + (f"; {missing}" if judged.holds is None else "")
-    return _published(figure, judged.holds, residual, method, figures, witness)
+    return StatementVerdict(
+        figure.quantity,
+        figure.component,
+        "printed",
+        f"t={figure.time_text}",
+        None if judged is None else judged.holds,
+        residual,
+        f"{name} = {figure.number.text} within {allowed} at t = {figure.time_text}",
+        witness,
+        note=method,
+        figures=figures,
+    )
 
 
 def _texts(middle: Fraction, wide: Fraction, digits: int) -> tuple[str, str]:
@@ -377,43 +393,6 @@ def _off(judged: Judgement) -> str:
         return f"off by {high}"
     most = radius_text(judged.off[1])
     return f"off by less than {most}" if low == "0" else f"off by {low} to {most}"
-
-
-def _open_row(figure: Figure, method: str, missing: str) -> StatementVerdict:
-    return _published(figure, None, missing, method, _said(figure), None)
-
-
-def _said(figure: Figure) -> dict[str, Any]:
-    said: dict[str, Any] = {"printed": figure.number.text}
-    if figure.tolerance is not None:
-        said["tolerance"] = figure.tolerance_text
-    return said | {"digits_printed": figure.number.digits}
-
-
-def _published(
-    figure: Figure,
-    holds: bool | None,
-    residual: str,
-    method: str,
-    figures: dict[str, Any],
-    witness: dict[str, Any] | None,
-) -> StatementVerdict:
-    name = figure.quantity if figure.quantity not in SIZES else f"{figure.quantity} {figure.component}"
-    said = "half a unit of the last digit" if figure.tolerance is None else figure.tolerance_text
-    statement = f"{name} = {figure.number.text} within {said} at t = {figure.time_text}"
-    domain = f"t={figure.time_text}"
-    return StatementVerdict(
-        figure.quantity,
-        figure.component,
-        "printed",
-        domain,
-        holds,
-        residual,
-        statement,
-        witness,
-        note=method,
-        figures=figures,
-    )
 
 
 class _KnownNumbers:
@@ -446,17 +425,18 @@ class _KnownNumbers:
     def require(self, figures: Sequence[Figure]) -> None:
         """Raises InputError for an unknown quantity, and one that γ alone does not fix."""
         for figure in figures:
+            place = f"{figure.place} (component {figure.component}, t = {figure.time_text[:40]})"
             if figure.quantity not in SIZES and figure.quantity not in self._integrals:
                 known = ", ".join((*SIZES, *self._integrals))
                 raise InputError(
-                    f"quantity must be one of this motion; got {figure.quantity[:40]!r}.",
+                    f"{place}: quantity must be one of this motion; got {quoted(figure.quantity)}.",
                     f"Use {known}: the first integrals are those that are constant along it.",
                 )
-            turned = figure.quantity in ("quaternion", "omega_space")
-            turned |= figure.quantity == "position" and figure.component < 3
-            if turned and self.start.attitude is None:
+            is_fixed = figure.quantity in ("omega", "gamma", *self._integrals)
+            is_fixed |= figure.quantity == "position" and figure.component == 3
+            if not is_fixed and self.start.attitude is None:
                 raise InputError(
-                    f"gamma does not fix {figure.quantity} {figure.component}.",
+                    f"{place}: gamma does not fix {figure.quantity} {figure.component}.",
                     "Give the attitude of the start: quaternion, matrix, euler or axis_angle in place of gamma.",
                 )
 
@@ -482,7 +462,7 @@ class _KnownNumbers:
             return state[:3] if quantity == "omega" else state[3:6]
         if self.start.attitude is None:
             return self._height(self.motion.state(time, bits), bits)
-        return self._output(Output(quantity.replace("_", "-")), self.motion.whole(time, bits)[1](time, bits), bits)
+        return self._output(Output(quantity.replace("_", "-")), self.motion.with_attitude(time, bits), bits)
 
     @whole_evaluation
     def _height(self, state: Sequence[arb], bits: int) -> list[arb]:
@@ -491,9 +471,9 @@ class _KnownNumbers:
             return [arb("nan"), arb("nan"), dot([ball(value) for value in self.body.centre], state[3:6])]
 
     @whole_evaluation
-    def _output(self, output: Output, whole: Sequence[arb], bits: int) -> list[arb]:
+    def _output(self, output: Output, motion: Sequence[arb], bits: int) -> list[arb]:
         with working_precision(bits + _SPARE_BITS):
-            components = list(output.at(whole[:3], whole[3:6], whole[6:], self.body.centre, FUNCTIONS, ball))
+            components = list(output.at(motion[:3], motion[3:6], motion[6:], self.body.centre, FUNCTIONS, ball))
         if not all(value.is_finite() for value in components):
             raise OutOfReach(f"The {output.name} is not known to {bits} bits.")
         return components

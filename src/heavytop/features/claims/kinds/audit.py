@@ -85,7 +85,7 @@ class AuditKind(Kind):
         return _SECONDS
 
     def measure(self, task: Task, saved: Saved) -> Row:
-        """Of the branches of a claim about the gyrostat the smooth one alone, which the formulas solve."""
+        """The verdicts on a claim; about the gyrostat on its smooth branch alone, which the formulas solve."""
         from heavytop.features.claims.audit.audit import PAPER, paper_claim
         from heavytop.features.claims.audit.judge import judge
 
@@ -169,9 +169,9 @@ def _equations(claim: str, rows: Sequence[Row]) -> Iterator[Note]:
 def _counted(row: Row) -> str:
     """How many equations are proven, and which are refuted."""
     _, refuted, held = _verdict(row)
-    said = f"{held} of {len(_equations_of(row))} equations proven"
+    proven = f"{held} of {len(_equations_of(row))} equations proven"
     names = sorted({quantity.name for quantity in refuted})
-    return said + (f", {len(refuted)} refuted: {clip(', '.join(names), 120)}" if refuted else "")
+    return proven + (f", {len(refuted)} refuted: {clip(', '.join(names), 120)}" if refuted else "")
 
 
 def _of_entry(task: Task) -> Row:
@@ -211,10 +211,10 @@ def _of_library(rows: Sequence[Row]) -> str:
     verdicts = [_verdict(row)[0] for row in rows]
     counts = ((verdicts.count("holds"), "proven"), (verdicts.count("refuted"), "refuted"))
     open_ones = verdicts.count("undecided")
-    said = [f"{count} {what}" for count, what in (*counts, (open_ones, "undecided")) if count]
+    counted = [f"{count} {what}" for count, what in (*counts, (open_ones, "undecided")) if count]
     off = [row.case for row in rows if row.metrics[EXPECTED.text].value != "1"]
     expected = f"not as expected: {', '.join(off)}" if off else "every verdict as expected"
-    return f"Library of {plural(len(rows), 'claim')}: {', '.join(said)}; {expected}."
+    return f"Library of {plural(len(rows), 'claim')}: {', '.join(counted)}; {expected}."
 
 
 def _of_verdicts(rows: Sequence[Row]) -> Headline:

@@ -21,7 +21,7 @@ from heavytop.records import Against, Beside, Direction, Metric, Quantity, Row, 
 from heavytop.report.document.document import Block, Cell, Chart, Headline, Value, short
 from heavytop.report.document.document import Table as Cells
 from heavytop.report.render.text import both, largest_over
-from heavytop.report.store.checks import CLOSE, sizes
+from heavytop.report.store.checks import CLOSE, peak
 from heavytop.top.equations import GYROSTAT
 
 NAME = "claim_evaluation"
@@ -98,8 +98,8 @@ class ClaimEvaluation(Kind):
         measured = f"{CLAIM}, {form} form, evaluated in {precision.name}; times of the series are k t"
         against = Against("proven", "the same form exactly evaluated from the same rounded data")
         row = exact_row(task, measured, against, by_name(metrics), precision.bits, series)
-        whole = all(m.value == "0" for quantity, m in metrics.items() if quantity.statistic == _LOST)
-        return replace(row, finite=whole)
+        is_finite = all(m.value == "0" for quantity, m in metrics.items() if quantity.statistic == _LOST)
+        return replace(row, finite=is_finite)
 
     def contradictions(self, row: Row) -> Iterator[str]:
         """A series holds every sample: those that are not finite are counted, and the last begin somewhere."""
@@ -112,13 +112,8 @@ class ClaimEvaluation(Kind):
                 yield f"{Quantity(_COUNT, component, _LOST).text}: {count.value}, where the series has {lost}"
             if since is not None and series.values and (since.value == "never") == (series.values[-1] == "nan"):
                 yield f"{Quantity(_COUNT, component, _SINCE).text}: {since.value}, where the series says otherwise"
-            sizes_of_series = sizes(series)
-            if (
-                worst is not None
-                and worst.log10 is not None
-                and sizes_of_series
-                and abs(max(sizes_of_series) - worst.log10) > CLOSE
-            ):
+            largest = None if worst is None or worst.log10 is None else peak(series)
+            if worst is not None and largest is not None and abs(largest - (worst.log10 or 0.0)) > CLOSE:
                 yield f"{Quantity(EVALUATION_ERROR, component, _WORST).text}: not the largest of its series"
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
@@ -128,9 +123,9 @@ class ClaimEvaluation(Kind):
         for row in rows:
             if row.bits == bits and row.metrics:
                 forms.setdefault(row.key.subject.form, []).append(row)
-        said = "; ".join(f"the {form} form {_said(members)}" for form, members in sorted(forms.items()))
-        if said:
-            yield Headline(f"In {next(iter(forms.values()))[0].precision} {said}.")
+        sentences = "; ".join(f"the {form} form {_said(members)}" for form, members in sorted(forms.items()))
+        if sentences:
+            yield Headline(f"In {next(iter(forms.values()))[0].precision} {sentences}.")
         yield Cells(
             "Formulas in floating point: as printed, and in the stable form, each against itself exactly evaluated",
             ["case", "format", "form", "Ω error", "θ error", "ψ error", "ψ NaN/inf from |t|", "Ω NaN/inf from |t|"],

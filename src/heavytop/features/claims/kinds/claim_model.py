@@ -381,10 +381,10 @@ def _card(row: Row, others: Iterable[Row]) -> Card:
     if parts_at == "never":
         lines = [Note(f"Ω stays within 1 % of α of the true motion up to |t| = {horizon}.")]
     else:
-        said = "The first time at which the largest component of |ΔΩ| from the true motion is 1 % of α, proven. "
+        explanation = "The first time at which the largest component of |ΔΩ| from the true motion is 1 % of α, proven. "
         largest_error = short(largest.value) if largest else "missing"
-        said += f"The largest error {over} up to |t| = {horizon} is {largest_error}."
-        lines = [Note(f"|t| = {parts_at}", style="big"), Note(said)]
+        explanation += f"The largest error {over} up to |t| = {horizon} is {largest_error}."
+        lines = [Note(f"|t| = {parts_at}", style="big"), Note(explanation)]
     for other in others:
         at = short(other.metrics[PARTS.text].value)
         when = f"not up to |t| = {horizon}" if at == "never" else f"from |t| = {at}"

@@ -88,7 +88,7 @@ def split(table: Mapping[str, Any], where: str) -> tuple[Entry | None, dict[str,
     try:
         entry = msgspec.convert({key: table[key] for key in _KEYS if key in table}, Entry)
     except (msgspec.ValidationError, RecursionError) as error:
-        raise InputError(f"{where}: {invalid(error)}.", _REMEDY) from None
+        raise InputError(f"{where}: {invalid(error, Entry)}.", _REMEDY) from None
     claim = {key: value for key, value in table.items() if key not in _KEYS}
     return entry, claim | {"name": entry.title[:80], "source": entry.source.text[:2_000]}
 

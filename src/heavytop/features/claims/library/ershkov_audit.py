@@ -73,15 +73,15 @@ Formula = Callable[..., Any]
 
 
 class _PaperClaim:
-    """A claim of the paper; places: its branches and where each is claimed, the smooth one first."""
+    """A claim of the paper; branches: its branches and where each is claimed, the smooth one first."""
 
     __slots__ = ()
-    places: ClassVar[tuple[tuple[str, Domain], ...]]
+    branches: ClassVar[tuple[tuple[str, Domain], ...]]
 
     @property
     def motion(self: Any) -> ClaimedMotion:
         """The smooth branch, which follows the flow."""
-        motion: ClaimedMotion = self._motion(*self.places[0])
+        motion: ClaimedMotion = self._motion(*self.branches[0])
         return motion
 
     def about(self, asked: System | None) -> System:
@@ -94,7 +94,7 @@ class _PaperClaim:
 
     def statements(self: Any, system: System) -> list[Statement]:
         """Every equation that the claim should satisfy as a motion of ``system``, and its own steps."""
-        motions = [self._motion(branch, domain) for branch, domain in self.places]
+        motions = [self._motion(branch, domain) for branch, domain in self.branches]
         about = [statement for motion in motions for statement in motion_statements(motion, self.parameters, system)]
         return [*about, *self._steps()]
 
@@ -210,8 +210,8 @@ class PartialClaim(_PaperClaim):
         root = sympy.sqrt(u * u)
         printed = self.phi(c, root, SYMBOLIC), self.theta(c, root, SYMBOLIC)
         continued = ershkov.angles_smooth(c, u, SYMBOLIC)
-        places = (("smooth", ALL, continued), ("printed", BEFORE, printed), ("printed", AFTER, printed))
-        for branch, domain, (phi, theta) in places:
+        branches = (("smooth", ALL, continued), ("printed", BEFORE, printed), ("printed", AFTER, printed))
+        for branch, domain, (phi, theta) in branches:
             turned = gamma_from_angles(phi, theta, SYMBOLIC)
             for component, (ours, theirs) in enumerate(zip(turned, smooth.gamma, strict=True), 1):
                 text = "(4.5) in (3.2): gamma of the angles is gamma of the smooth branch"
@@ -230,7 +230,7 @@ class PartialClaim(_PaperClaim):
         c = _partial_constants()
         line = c.alpha * _T * (_I1 + _I3) / (2 * _I3)
         readings = {"smooth": "u of (4.2)", "printed": "u = sqrt(Omega2)"}
-        for branch, domain in self.places:
+        for branch, domain in self.branches:
             u = self.u(c.a, c.alpha, _T, SYMBOLIC)
             if branch == "printed":
                 u = sympy.sqrt(u * u)
@@ -370,7 +370,7 @@ _I1, _I2, _I3, _P, _C0, _ALPHA = sympy.symbols("I1 I2 I3 P C0 alpha", positive=T
 _SIGN1, _SIGN3 = sympy.sign(_S1), sympy.sign(_S3)
 _GENERAL = GeneralConstants((_I1, _I2, _I3), _P, _B, _C0, _C1)
 _POLE = "t ≠ 0 (pole of the angles)"
-PartialClaim.places = (("smooth", ALL), ("printed", BEFORE), ("printed", AFTER))
+PartialClaim.branches = (("smooth", ALL), ("printed", BEFORE), ("printed", AFTER))
 _HERE = (Fraction(1, 5), Fraction(1, 3))
 _BOTH_HERE = (*_HERE, Fraction(-1, 5))
 _REAL = (ershkov_general.f1(_GENERAL, _W), ershkov_general.f2(_GENERAL, _W))
@@ -379,4 +379,4 @@ _ANY_ROOT = Domain("all", 0, _BOTH_HERE, "positive roots, every Omega2 with f1, 
 _MINIMUM = "time is counted from a minimum of Omega2"
 _FALLING = Domain("t<=0", 1, _HERE, f"positive roots, Omega2' < 0, Omega2 > 0: {_MINIMUM}", _REAL)
 _RISING = Domain("t>0", 1, _HERE, f"positive roots, Omega2' > 0, Omega2 > 0: {_MINIMUM}", _REAL)
-GeneralClaim.places = (("smooth", _ANY), ("printed", _FALLING), ("printed", _RISING))
+GeneralClaim.branches = (("smooth", _ANY), ("printed", _FALLING), ("printed", _RISING))
