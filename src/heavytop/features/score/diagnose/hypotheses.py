@@ -104,8 +104,12 @@ def readings(run: Examined, truth: Array) -> tuple[list[Hypothesis], list[Hypoth
     if len(run.frame.columns) < 6:
         return [], []
     changes, kinds, numbers, places, factors = _every_reading()
-    columns = numpy.hstack([truth[:, :6], truth[:, :3] @ run.tensor])
-    errors = run.errors((columns[:, numpy.array(places)] * numpy.array(factors)).swapaxes(0, 1))
+    time, inertia = float(run.units.time), float(run.units.inertia)
+    columns = numpy.hstack([truth[:, :6], inertia * truth[:, :3] @ run.tensor])
+    place, factor = numpy.array(places), numpy.array(factors)
+    # a vector in the place of the other is in the unit of that
+    factor[place[:, 0] // 3 == 1] *= numpy.repeat([time, 1 / time], 3)
+    errors = run.errors((columns[:, place] * factor).swapaxes(0, 1))
     tried = list(map(Hypothesis, kinds, numbers, errors))
     return tried[: changes.count(1)], tried[changes.count(1) :]
 

@@ -34,6 +34,8 @@ FITTED_DROP = 1000.0
 """... by so much for one whose numbers were fitted; ..."""
 LIKELY_DROP = 30.0
 """... one without a free number by which it falls less is likely."""
+_NOTHING = 0.5
+"""A hypothesis that leaves more explains nothing, however large the error is without it."""
 FIRST = (6, 2)
 """Of the samples away from t = 0, those judged by themselves: there a method of low order is off by little."""
 _MOST_OTHERS = 3
@@ -137,6 +139,7 @@ class Search:
         """The simplest of these hypotheses that explains the error of the first so many samples."""
         looked = len(self.own) if looked is None else looked
         lefts = [(hypothesis, hypothesis.left(looked)) for hypothesis in tried]
+        lefts = [pair for pair in lefts if pair[1] <= _NOTHING]
         explained = [(hypothesis, left) for hypothesis, left in lefts if left * hypothesis.least_fall(drop) <= own]
         if not explained:
             return None
