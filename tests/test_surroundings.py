@@ -75,17 +75,10 @@ def test_characters_that_an_encoding_lacks_are_replaced() -> None:
     assert "3  0.96912566428666425" in text.stdout.decode("ascii")
 
 
-def test_json_loses_nothing_in_any_encoding(tmp_path: Path) -> None:
-    (tmp_path / "Ω é.csv").write_text(TRAJECTORY, "utf-8")
-    done = shell("heavytop score 'Ω é.csv' --json", cwd=tmp_path, PYTHONIOENCODING="ascii")
-    assert_said(done, 0)
-    assert json.loads(done.stdout)["case"] == "Ω é"
-
-
 @pytest.mark.parametrize(
     ("what", "where"),
-    [([*PROPAGATE, "--json"], ">&-"), (PROPAGATE, "> /dev/full"), (["list"], "> /dev/full"), (["--help"], ">&- 2>&-")],
-    ids=["json closed", "table full", "lines full", "all closed"],
+    [([*PROPAGATE, "--json"], ">&-"), (["list"], "> /dev/full"), (["--help"], ">&- 2>&-")],
+    ids=["json closed", "lines full", "all closed"],
 )
 def test_an_output_that_cannot_be_written_is_exit_2_with_its_cause(what: list[str], where: str) -> None:
     done = shell(f"heavytop {' '.join(what)} {where}")
@@ -158,12 +151,14 @@ def test_any_name_of_a_path_is_taken(tmp_path: Path) -> None:
     assert page.exists()
 
 
-def test_a_name_that_is_no_text_is_taken(tmp_path: Path) -> None:
+def test_a_name_that_is_no_text_is_taken_and_json_loses_nothing_in_any_encoding(tmp_path: Path) -> None:
     folder = tmp_path / os.fsdecode(b"\xff\xfe")
     folder.mkdir()
-    (folder / "mine.csv").write_text(TRAJECTORY)
-    done = shell('heavytop score mine.csv --out out && heavytop history "$PWD/out" "$PWD/out" --json', cwd=folder)
+    (folder / "Ω é.csv").write_text(TRAJECTORY, "utf-8")
+    score = "heavytop score 'Ω é.csv' --out out --json"
+    done = shell(f'{score} && heavytop history "$PWD/out" "$PWD/out" --json', cwd=folder, PYTHONIOENCODING="ascii")
     assert_said(done, 0)
+    assert json.JSONDecoder().raw_decode(done.stdout.decode("ascii"))[0]["case"] == "Ω é"
     assert b"\\udcff" in done.stdout
 
 

@@ -30,14 +30,12 @@ def delone(omega, gamma3, moment, i3=Fraction(1)):
     return Delone(HeavyTop((2 * i3, 2 * i3, i3), 1, (n1, n2, 0)), State(omega, gamma))
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_every_random_motion_solves_all_six_equations(seed):
+def random_motion(seed):
     rng = random.Random(seed)
     omega = [rational(rng) for _ in range(3)]
     if seed % 6 == 1:
         omega[rng.randrange(3)] = Fraction(0)
-    motion = delone(omega, rational(rng), (rational(rng), positive(rng)), positive(rng))
-    assert_solves(motion, rational(rng, size=20))
+    return delone(omega, rational(rng), (rational(rng), positive(rng)), positive(rng))
 
 
 @pytest.mark.parametrize("off", [0, TINY, -TINY])
@@ -67,15 +65,6 @@ def test_beside_the_permanent_rotation_every_digit_comes_out():
 
 # |gamma| = 1: gamma1 = (3/5)^2/(3/5)
 UNIT = delone((Fraction(3, 5), Fraction(0), Fraction(1)), Fraction(4, 5), (Fraction(3, 5), 0))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(8))
-def test_the_attitude_turns_with_the_body(seed):
-    rng = random.Random(seed)
-    omega = [rational(rng) for _ in range(3)]
-    motion = delone(omega, rational(rng), (rational(rng), positive(rng)), positive(rng))
-    assert_attitude(motion, rational(rng, size=20))
 
 
 # turning points (Ω2 = 0, n on axis 1), M·γ = 0: (1, 0, −2) with γ = (1, 0, 1), no start at rest

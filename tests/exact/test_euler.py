@@ -9,7 +9,7 @@ import pytest
 
 from heavytop.exact.cases.euler import Euler
 from heavytop.top.heavy_top import HeavyTop, State
-from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational, triple
+from support.proofs import assert_narrow, assert_solves, positive, triple
 
 VECTORS = json.loads((Path(__file__).parents[1] / "data" / "vectors.json").read_text())
 TINY = Fraction(1, 10**30)
@@ -19,27 +19,16 @@ def euler(inertia, omega, gamma=(Fraction(2, 3), Fraction(-1, 3), Fraction(2, 3)
     return Euler(HeavyTop(inertia, 1, (0, 0, 0)), State(omega, gamma))
 
 
-def random_case(rng, k):
+def random_motion(seed):
+    rng = random.Random(seed)
     inertia, omega = list(triple(rng, positive)), list(triple(rng))
-    if k % 4 == 1:
+    if seed % 4 == 1:
         inertia[rng.randrange(3)] = inertia[rng.randrange(3)]
-    if k % 5 == 2:
+    if seed % 5 == 2:
         omega[rng.randrange(3)] = Fraction(0)
-    if k % 11 == 3:
+    if seed % 11 == 3:
         inertia = [inertia[0]] * 3
     return euler(inertia, omega, triple(rng))
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_every_random_motion_solves_all_six_equations(seed):
-    rng = random.Random(seed)
-    assert_solves(random_case(rng, seed), rational(rng, size=30))
-
-
-@pytest.mark.parametrize("seed", range(12))
-def test_the_attitude_turns_with_the_body(seed):
-    rng = random.Random(100 + seed)
-    assert_attitude(random_case(rng, seed), rational(rng))
 
 
 # the separatrix L² = 2E I2 is I1 (I1 − I2) Ω1² = I3 (I2 − I3) Ω3²: for these moments 36 Ω1² = 4 Ω3², rational

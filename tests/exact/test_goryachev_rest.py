@@ -11,14 +11,11 @@ from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.cases import goryachev_chaplygin_rest
 from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplygin
 from heavytop.exact.cases.goryachev_chaplygin_rest import GoryachevChaplyginRest
-from heavytop.exact.catalogue import find
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import working_precision
 from heavytop.measure.reference import reference
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import (
-    assert_attitude,
-    assert_enclosed,
     assert_meets,
     assert_narrow,
     assert_solves,
@@ -59,19 +56,6 @@ def moving(seed):
 TENDING = [State((3, 4, 0), (200, -150, 0)), State((-3, 4, 0), (F(-200, 9), F(-50, 3), 0))]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(12))
-@pytest.mark.parametrize("make", [from_rest, moving])
-def test_every_random_motion_solves_all_six_equations(make, seed):
-    motion, rng = make(seed), random.Random(seed)
-    assert_solves(motion, rational(rng, size=30))
-    assert_solves(motion, -rational(rng))
-    assert_narrow(motion, FAR)
-    assert_attitude(motion, rational(rng))
-    found = find(motion.top, motion.start)
-    assert isinstance(found, GoryachevChaplyginRest)
-
-
 @pytest.mark.parametrize("start", TENDING)
 def test_motions_that_tend_to_rest_are_elementary(start):
     motion = GoryachevChaplyginRest(TOP, start)
@@ -85,11 +69,6 @@ def test_motions_that_tend_to_rest_are_elementary(start):
     with pytest.raises(OutOfReach, match="h = a"):
         motion.attitude(F(1), 100)
     assert reference(TOP, start, [1], 20).method.startswith("closed form: Goryachev")
-
-
-@pytest.mark.parametrize("motion", [from_rest(1), from_rest(5), moving(1), moving(2)])
-def test_the_enclosure_holds_the_closed_form(motion):
-    assert_enclosed(motion)
 
 
 @pytest.mark.slow

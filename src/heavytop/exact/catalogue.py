@@ -13,8 +13,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 
-from flint import arb
-
 from heavytop.errors import LevelNotDone, NotInClass, OutOfReach
 from heavytop.exact.cases.bobylev_steklov import BobylevSteklov
 from heavytop.exact.cases.delone import Delone, DeloneHomoclinic
@@ -51,35 +49,6 @@ from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 _KEEP: tuple[Axes, ...] = ALL[:1]
-
-
-@dataclass(frozen=True, slots=True)
-class OnLevel(Validated):
-    """The enclosure of a motion whose class does not cover its level; what it cannot reach is refused with ``level``.
-
-    level: the class, the level and the distance from it.
-    """
-
-    level: str = ""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "method", f"{self.method}, as no closed form covers the level ({self.level})")
-        Validated.__post_init__(self)
-
-    def state(self, time: Fraction, bits: int) -> list[arb]:
-        return self._named(Validated.state, time, bits)
-
-    def attitude(self, time: Fraction, bits: int) -> list[arb]:
-        return self._named(Validated.attitude, time, bits)
-
-    def with_attitude(self, time: Fraction, bits: int) -> list[arb]:
-        return self._named(Validated.with_attitude, time, bits)
-
-    def _named(self, evaluate: Callable[[Validated, Fraction, int], list[arb]], time: Fraction, bits: int) -> list[arb]:
-        try:
-            return evaluate(self, time, bits)
-        except OutOfReach as error:
-            raise OutOfReach(f"{error.cause} {self.level}", error.remedy) from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,9 +159,7 @@ def find(top: HeavyTop, start: State, system: System = HEAVY_TOP, effort: float 
         if not isinstance(attempt, LevelNotDone):
             return attempt
         level = level or attempt.cause
-    if level:
-        return OnLevel(top, start, system, effort=effort, level=level)
-    return Validated(top, start, system, effort=effort)
+    return Validated(top, start, system, effort=effort, level=level)
 
 
 def state_and_attitude(

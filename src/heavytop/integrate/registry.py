@@ -135,7 +135,12 @@ class Integrator:
             return self.source.load()
         if callable(self.function):
             return self.function
-        entry = self if self.function else self._of_package()
+        if not (self.function or self.name in known()):
+            _of_packages.cache_clear()  # it may have been installed since
+            if self.name not in known():
+                remedy = f"{meant(self.name, known())}`heavytop list` shows the integrators. {_YOURS}"
+                raise InputError(f"Unknown integrator {quoted(self.name)}.", remedy)
+        entry = self if self.function else known()[self.name]
         if entry.lacks:
             raise missing(extra_of(entry.lacks), f"The integrator {self.name}")
         try:
@@ -153,15 +158,6 @@ class Integrator:
             cause = f"is broken: {entry.function} is not callable."
             raise InputError(f"The integrator {self.name} {cause}", entry.remedy)
         return function  # type: ignore[no-any-return]
-
-    def _of_package(self) -> Integrator:
-        """The entry of another package's; raises InputError where absent."""
-        if self.name not in known():
-            _of_packages.cache_clear()  # it may have been installed since
-        if self.name not in known():
-            remedy = f"{meant(self.name, known())}`heavytop list` shows the integrators. {_YOURS}"
-            raise InputError(f"Unknown integrator {quoted(self.name)}.", remedy)
-        return known()[self.name]
 
     @property
     def remedy(self) -> str:

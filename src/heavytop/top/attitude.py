@@ -444,9 +444,8 @@ def euler_angles(gamma: Sequence[Real], xi: Sequence[Real], lib: Library) -> Thr
 
     φ and ψ are undefined at the poles γ3 = ±1.
     """
-    eta = cross(gamma, xi)
-    across = lib.sqrt(gamma[0] * gamma[0] + gamma[1] * gamma[1])
-    return lib.atan2(gamma[0], gamma[1]), lib.atan2(across, gamma[2]), lib.atan2(xi[2], -eta[2])
+    psi, theta, phi = euler_of_rows(rows_of(gamma, xi), "ZXZ", lib)
+    return phi, theta, psi
 
 
 def rotation_angle(

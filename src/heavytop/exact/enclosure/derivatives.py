@@ -325,14 +325,12 @@ def moved(p: Parameters, datum: int, by: Any) -> Parameters:
 
 
 def slope(system: System, p: Parameters, datum: int, unit: Fraction) -> Callable[[Sequence[mpq]], list[mpq]]:
-    """``unit`` ∂f/∂θ for one of :data:`DATA`."""
+    """``unit`` ∂f/∂θ for one of :data:`DATA`, within :class:`series_length` of 2."""
+    varied = moved(p.mapped(rational), datum, fmpq_series([0, rational(unit)]))
 
-    @whole_evaluation
     def rates(y: Sequence[mpq]) -> list[mpq]:
-        with series_length(2):
-            varied = moved(p.mapped(rational), datum, fmpq_series([0, rational(unit)]))
-            state = [fmpq(int(value.numerator), int(value.denominator)) for value in y]
-            slopes = [coefficient(fmpq_series(rate), 1) for rate in system.field(varied, state)]
+        state = [fmpq(int(value.numerator), int(value.denominator)) for value in y]
+        slopes = [coefficient(fmpq_series(rate), 1) for rate in system.field(varied, state)]
         return [mpq(int(slope.p), int(slope.q)) for slope in slopes]
 
     return rates
@@ -461,7 +459,7 @@ def _independent(known: Validated, motion: ScaledMotion) -> tuple[int, ...]:
 def _tangent(
     known: Validated, motion: ScaledMotion, precision: int, in_words: bool, places: tuple[int, ...]
 ) -> Tangent:
-    data = [_datum(known, motion, k) for k in places]
+    data = _data(known, motion, places)
     data_of = tuple(datum for datum, _ in data)
     together = Together.of(motion.field, [datum.field for datum in data_of])
     lanes = [lanes_of_datum for _, lanes_of_datum in data if lanes_of_datum is not None]
@@ -473,6 +471,12 @@ def _tangent(
     tangent = Tangent(motion.field, precision, together, certified, columns, data_of, places)
     _require_right(tangent, motion)
     return tangent
+
+
+@whole_evaluation
+def _data(known: Validated, motion: ScaledMotion, places: Sequence[int]) -> list[tuple[Datum, Coefficients | None]]:
+    with series_length(2):
+        return [_datum(known, motion, k) for k in places]
 
 
 def _datum(known: Validated, motion: ScaledMotion, datum: int) -> tuple[Datum, Coefficients | None]:

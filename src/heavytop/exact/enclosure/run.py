@@ -395,6 +395,9 @@ def seconds_a_step(precision: int, in_words: bool) -> float:
     return 4e-4 + 1.2e-11 * precision**3 if in_words else 1e-3 + 6e-8 * precision**2
 
 
+_METHOD = "validated: Taylor enclosure"
+
+
 @dataclass(frozen=True, slots=True)
 class Validated:
     """The motion from ``start``, enclosed.
@@ -403,6 +406,7 @@ class Validated:
     None for P b/(M·γ).  xi: the attitude vector at time 0; None for :func:`heavytop.top.attitude.perpendicular`.
     uncertainty: what the data lack; the motion enclosed is the true one.  None for exact data.
     effort: what a request may cost, in seconds of the cost model; beyond it the request is refused.
+    level: the class that has the motion but not its level, the level and the distance from it; "" for none.
     unit: the motion changes at about the rate 2^unit (:func:`heavytop.exact.flint.balls.unit_of_time`).
     Raises InputError where the system does not admit the top and start, OutOfReach where they are too large.
     """
@@ -413,9 +417,10 @@ class Validated:
     rotor: Fraction | None = None
     xi: Vector | None = None
     effort: float = EFFORT
-    method: str = "validated: Taylor enclosure"
+    method: str = _METHOD
     source: ClassVar[str] = "theorem of a step: exact/enclosure/step.py of the program"
     uncertainty: Uncertainty | None = None
+    level: str = ""
     unit: int = field(default=0, init=False, repr=False, compare=False)
     _runs: dict[tuple[int, int, bool, int], EnclosureRun] = field(
         default_factory=dict, init=False, repr=False, compare=False
@@ -427,6 +432,8 @@ class Validated:
 
     def __post_init__(self) -> None:
         require_handy(self.top, self.start)
+        if self.level:
+            object.__setattr__(self, "method", f"{_METHOD}, as no closed form covers the level ({self.level})")
         object.__setattr__(self, "unit", unit_of_time(self.parameters, self.start.flat))
         motion = self._motion(1, self.start.flat)
         rate = coefficient_bound(motion.field, max(map(abs, motion.scaled.state)))
@@ -600,11 +607,10 @@ class Validated:
     def _refusal(self, time: Fraction, reachable: int) -> OutOfReach:
         at, digits = decimal_text(time, 6), int((reachable - 5) * log10(2))  # rounded up they take up to 5 bits more
         if digits < 1:
-            return OutOfReach(
-                f"No digit at t = {at} is within reach of a validated integration.", "Ask for an earlier time."
-            )
+            cause = f"No digit at t = {at} is within reach of a validated integration. {self.level}"
+            return OutOfReach(cause.strip(), "Ask for an earlier time.")
         return OutOfReach(
-            f"So many digits at t = {at} are out of reach of a validated integration.",
+            f"So many digits at t = {at} are out of reach of a validated integration. {self.level}".strip(),
             f"About {digits} digits could be proven there: ask for fewer, or for an earlier time.",
         )
 

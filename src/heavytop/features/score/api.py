@@ -27,7 +27,7 @@ from heavytop.measure.scalar import digits_kept, digits_text
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR, Drift
 from heavytop.precision import Precision, ordered, vector
 from heavytop.records import Metric, Peer, Report, Row
-from heavytop.report.document.document import short
+from heavytop.report.document.document import integral_text, short
 from heavytop.top.bodies import Body
 from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State, check_times
@@ -169,7 +169,7 @@ class Score(Tabular):
                 kept += f" ({self.peer.integrator} keeps {digits_text(self.peer.digits_right)})"
         until = f" before t = {short(self.row.reference.until)}" if self.row.reference.until else ""
         sizes = {_LABELS[part] + until: size for part, size in self.distance.items()}
-        sizes |= {f"drift of {name}": size for name, size in self.drift.items()}
+        sizes |= {f"drift of {integral_text(name)}": size for name, size in self.drift.items()}
         title = f"{row.case} in {row.precision}: {self.outcome}, {kept}"
         return TitledTable(
             title,

@@ -278,29 +278,32 @@ def _truth(drawn: Drawn, times: Sequence[Fraction], precision: Precision) -> tup
     """The reference, and the largest distance of the second run from it, absolute, a rounding of the format added, for
     short motions often agree in every bit.
     """
-    tolerances = _TOLERANCES if precision == DOUBLE else (None, _TOLERANCES[0])
-    references = [_reference(drawn, times, precision, tolerance) for tolerance in tolerances]
+    first, second = _references(drawn, times, precision)
     with numpy.errstate(all="ignore"):
-        apart = numpy.abs((references[0] - references[1]).high).max(axis=(1, 2))
-        size = numpy.abs(references[0].high).max(axis=(1, 2))
-        return references[0], apart + float(DOUBLE_DOUBLE.eps) * numpy.maximum(1.0, size)
+        apart = numpy.abs((first - second).high).max(axis=(1, 2))
+        size = numpy.abs(first.high).max(axis=(1, 2))
+        return first, apart + float(DOUBLE_DOUBLE.eps) * numpy.maximum(1.0, size)
 
 
-def _reference(drawn: Drawn, times: Sequence[Fraction], precision: Precision, tolerance: Fraction | None) -> Pairs:
-    """A run in double-double, of all motions."""
-    count = len(drawn.problems)
-    states, good = _pairs([()] * count, len(times)), numpy.zeros(count, bool)
-    if drawn.system is HEAVY_TOP and tolerance is not None and _usual(drawn, times, precision):
-        numbers = drawn.numbers.high
-        states, good = double_double_states(numbers[:, :6], numbers[:, 6:], times, tolerance, _STEP_LIMIT)
-    rest = numpy.flatnonzero(~good)
-    problems = [replace(drawn.problems[index], precision=DOUBLE_DOUBLE) for index in rest.tolist()]
-    if problems:
-        targets = [number(time, DOUBLE_DOUBLE) for time in times]
-        runs = propagate_multiword_ensemble(problems, targets, threads=1, step_limit=_STEP_LIMIT, tolerance=tolerance)
-        again = _pairs([run.states for run in runs], len(times))
-        states.high[rest], states.low[rest] = again.high, again.low
-    return states
+def _references(drawn: Drawn, times: Sequence[Fraction], precision: Precision) -> list[Pairs]:
+    """Two runs of all motions in double-double, of different tolerances."""
+    tolerances = _TOLERANCES if precision == DOUBLE else (None, _TOLERANCES[0])
+    if drawn.system is HEAVY_TOP and _usual(drawn, times, precision):
+        parameters, starts = drawn.numbers.high[:, :6], drawn.numbers.high[:, 6:]
+        runs = double_double_states(parameters, starts, times, _TOLERANCES, _STEP_LIMIT)
+    else:
+        count = len(drawn.problems)
+        runs = [(_pairs([()] * count, len(times)), numpy.zeros(count, bool)) for _ in tolerances]
+    targets = [number(time, DOUBLE_DOUBLE) for time in times]
+    for tolerance, (states, good) in zip(tolerances, runs, strict=True):
+        rest = numpy.flatnonzero(~good)
+        problems = [replace(drawn.problems[index], precision=DOUBLE_DOUBLE) for index in rest.tolist()]
+        if problems:
+            settings: dict[str, Any] = {"threads": 1, "step_limit": _STEP_LIMIT, "tolerance": tolerance}
+            again = propagate_multiword_ensemble(problems, targets, **settings)
+            pairs = _pairs([run.states for run in again], len(times))
+            states.high[rest], states.low[rest] = pairs.high, pairs.low
+    return [states for states, _ in runs]
 
 
 def _errors(states: Pairs, truth: Pairs, times: Sequence[Fraction], precision: Precision) -> Columns:

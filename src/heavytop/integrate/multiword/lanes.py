@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
 from itertools import permutations
@@ -33,7 +33,14 @@ from heavytop.integrate.trajectory import EnsembleObserver, Finished, Outcome, P
 from heavytop.multiword.codegen.machine_code import LANES, Doubles
 from heavytop.multiword.codegen.recurrence import LEAST_LOW_ORDER
 from heavytop.multiword.double_double.double_double_run import terms
-from heavytop.multiword.double_double.eight_lane_run import LEFT, Eight, exact_state
+from heavytop.multiword.double_double.eight_lane_run import (
+    LARGER_N0,
+    LEFT,
+    NON_FINITE,
+    TOO_SMALL,
+    Eight,
+    exact_state,
+)
 from heavytop.multiword.fixed_point.fixed_point_run import TINY_BITS
 from heavytop.multiword.pairs import Numerators, Pairs
 from heavytop.multiword.problem import Scaled
@@ -46,17 +53,17 @@ _RISE = 2
 
 @dataclass(slots=True, eq=False)
 class _Motion(LaneRun):
-    """A problem on its way; targets: its times |τ|; moved: its words, between two eights."""
+    """A problem on its way; instants: its exact times; moved: its words, between two eights."""
 
     scaled: Scaled
     exponents: tuple[int, ...]
-    targets: list[Fraction]
+    instants: list[Fraction]
     moved: tuple[Doubles, Doubles] | None = None
 
     @property
     def target(self) -> Fraction:
-        """The next of its times."""
-        return self.targets[len(self.times)]
+        """The next of its times, |τ|."""
+        return abs(self.instants[len(self.times)]) * self.scaled.rate
 
     def native(self, words: Doubles) -> Any:
         """A state in words of its units, rounded to the format; None where a number is too large for it."""
@@ -74,33 +81,27 @@ def first_low_order(arithmetic: DoubleDouble) -> int:
     return max(LEAST_LOW_ORDER, ceil(arithmetic.in_lanes.room / arithmetic.in_lanes.reach))
 
 
+@dataclass(slots=True)
 class WordsLanes:
     """The eight lanes of a thread.
 
     seconds: of compiling.  others: where problems go that need another arithmetic.
     """
 
-    def __init__(
-        self,
-        work: Work,
-        arithmetic: DoubleDouble,
-        tolerance: Fraction | None,
-        seconds: float,
-        others: deque[tuple[int, Problem]],
-    ) -> None:
-        self.work, self.arithmetic, self.tolerance, self.seconds = work, arithmetic, tolerance, seconds
-        self.others = others
-        self.forwards = bool(work.targets[-1] >= 0)
-        self.targets: dict[Fraction, list[Fraction]] = {}
-        self.lanes: dict[int, _Motion] = {}
-        self.waiting: deque[_Motion] = deque()
-        self.outgrown: deque[_Motion] = deque()
-        self.chunk = _FIRST_CHUNK
+    work: Work
+    arithmetic: DoubleDouble
+    tolerance: Fraction | None
+    seconds: float
+    others: deque[tuple[int, Problem]] = field(default_factory=deque)
+    lanes: dict[int, _Motion] = field(default_factory=dict)
+    waiting: deque[_Motion] = field(default_factory=deque)
+    outgrown: deque[_Motion] = field(default_factory=deque)
+    chunk: int = _FIRST_CHUNK
 
-    def _own_flags(self) -> dict[str, str]:
-        schedule = self.arithmetic.in_lanes
-        rule = f"radius of convergence times 2^{schedule.reach:.3f}, ten bits"
-        return {"lanes": str(LANES), "order": str(schedule.order), "step_rule": rule}
+    @property
+    def forwards(self) -> bool:
+        """Whether time is positive."""
+        return bool(self.work.targets[-1] >= 0)
 
     def run(self) -> None:
         """Until no problem is left, with n0 rising for those that outgrow it."""
@@ -137,9 +138,7 @@ class WordsLanes:
             if own != self.arithmetic:
                 self.others.append(taken)
                 continue
-            if scaled.rate not in self.targets:
-                self.targets[scaled.rate] = [abs(time) * scaled.rate for time in self.work.times]
-            motion = _Motion(index, problem, perf_counter(), scaled, scaled.exponents, self.targets[scaled.rate])
+            motion = _Motion(index, problem, perf_counter(), scaled, scaled.exponents, self.work.times)
             if not scaled.rest:
                 return motion
             for _ in self.work.times:
@@ -198,8 +197,11 @@ class WordsLanes:
         self._finish(motion, outcome, sign * eight.time(lane) / motion.scaled.rate, steps)
 
     def _finish(self, motion: _Motion, outcome: Outcome, reached: Fraction, steps: int) -> None:
-        order, flags = self.arithmetic.in_lanes.order, self.arithmetic.flags | self._own_flags()
-        self.work.end(motion, "multiword", outcome, reached, steps, order, self.seconds, flags)
+        schedule = self.arithmetic.in_lanes
+        rule = f"radius of convergence times 2^{schedule.reach:.3f}, ten bits"
+        own = {"lanes": str(LANES), "order": str(schedule.order), "step_rule": rule}
+        flags = self.arithmetic.flags | own
+        self.work.end(motion, "multiword", outcome, reached, steps, schedule.order, self.seconds, flags)
 
 
 # Many motions in multi-word arithmetic: eight in lanes where double-double serves, threads on top.
@@ -235,10 +237,10 @@ def propagate_multiword_ensemble(
 
 def _in_lanes(work: Work, arithmetic: DoubleDouble, tolerance: Fraction | None, seconds: float) -> None:
     """One thread of lanes, and afterwards those that need another arithmetic."""
-    others: deque[tuple[int, Problem]] = deque()
-    WordsLanes(work, arithmetic, tolerance, seconds, others).run()
-    while others:
-        _alone(work, tolerance, *others.popleft())
+    lanes = WordsLanes(work, arithmetic, tolerance, seconds)
+    lanes.run()
+    while lanes.others:
+        _alone(work, tolerance, *lanes.others.popleft())
 
 
 def _one_by_one(work: Work, tolerance: Fraction | None) -> None:
@@ -267,23 +269,18 @@ def double_double_states(
     parameters: NDArray[numpy.float64],
     starts: NDArray[numpy.float64],
     times: Sequence[Fraction],
-    tolerance: Fraction,
+    tolerances: Sequence[Fraction],
     step_limit: int,
-) -> tuple[Pairs, Any]:
-    """States (motions, samples, 6) of heavy tops, and which motions they are good for: the others need more care.
+) -> list[tuple[Pairs, Any]]:
+    """States (motions, samples, 6) of heavy tops by each tolerance, and which motions they are good for: the others
+    need more care.
 
     parameters: doubles (motions, 6), I and n.  starts: (motions, 6).  times: doubles, increasing from above 0.
     """
-    arithmetic = floats(wanted_tolerance(DOUBLE_DOUBLE, tolerance))
-    assert arithmetic is not None
     compiled_lanes(HEAVY_TOP)
     with numpy.errstate(all="ignore"):
-        run = _Grid(parameters, starts, numpy.array([float(time) for time in times]))
-        pending, low_order = numpy.flatnonzero(run.usual), first_low_order(arithmetic)
-        while len(pending) and low_order < arithmetic.in_lanes.order:
-            pending = run.advance(pending, arithmetic, low_order, step_limit)
-            low_order += _RISE
-        return run.states(), run.good
+        grid = _Grid(parameters, starts, numpy.array([float(time) for time in times]))
+        return [grid.run(tolerance, step_limit) for tolerance in tolerances]
 
 
 class _Grid:
@@ -305,8 +302,6 @@ class _Grid:
         self.times = numpy.ldexp(times[None, :], rate[:, None])
         self.order = numpy.argsort(numpy.maximum(speed, numpy.sqrt(torque)), kind="stable")
         self.usual = self._are_usual()
-        self.good = numpy.zeros(len(starts), bool)
-        self.samples = numpy.full((len(starts), len(times), 12), numpy.nan)
 
     def _are_usual(self) -> Any:
         """Motions of which double-double keeps every component, that do not rest."""
@@ -321,8 +316,20 @@ class _Grid:
         bounded = (constants < _LARGE).all(axis=1) & (numpy.abs(self.exponents) < 300).all(axis=1)
         return fine & turning & bounded & numpy.isfinite(self.begin).all(axis=1)
 
-    def advance(self, pending: Any, arithmetic: DoubleDouble, low_order: int, step_limit: int) -> Any:
-        """All these motions, those of like rates side by side; gives those that need a larger n0."""
+    def run(self, tolerance: Fraction, step_limit: int) -> tuple[Pairs, Any]:
+        """The states by this tolerance, and the motions that they are good for."""
+        arithmetic = floats(wanted_tolerance(DOUBLE_DOUBLE, tolerance))
+        assert arithmetic is not None
+        self.good = numpy.zeros(len(self.begin), bool)
+        self.samples = numpy.full((*self.times.shape, 12), numpy.nan)
+        pending, low_order = numpy.flatnonzero(self.usual), first_low_order(arithmetic)
+        while len(pending) and low_order < arithmetic.in_lanes.order:
+            pending = self._advance(pending, arithmetic, low_order, step_limit)
+            low_order += _RISE
+        return self._states(), self.good
+
+    def _advance(self, pending: Any, arithmetic: DoubleDouble, low_order: int, step_limit: int) -> Any:
+        """Take all these motions, those of like rates side by side; gives those that need a larger n0."""
         position = numpy.empty(len(self.order), int)
         position[self.order] = numpy.arange(len(self.order))
         ordered = pending[numpy.argsort(position[pending])]
@@ -331,8 +338,7 @@ class _Grid:
         for first in range(0, len(ordered), LANES):
             eights = ordered[numpy.minimum(numpy.arange(first, first + LANES), len(ordered) - 1)]
             self._eight(eight, eights, step_limit)
-            outgrown = [eight.status(lane) is None for lane in range(LANES)]
-            larger += eights[outgrown].tolist()
+            larger += eights[(eight.flags & (LARGER_N0 | NON_FINITE | TOO_SMALL)) == LARGER_N0].tolist()
             self.good[eights] = (eight.flags == 0) & (eight.clock[LEFT] > 0)
         return numpy.unique(numpy.array(larger, int))
 
@@ -343,8 +349,8 @@ class _Grid:
         for sample, targets in enumerate(self.times[eights].T):
             self.samples[eights, sample] = eight.reach_all(targets).T
 
-    def states(self) -> Pairs:
-        """In the units of the problems; NaN where they are not good."""
+    def _states(self) -> Pairs:
+        """The samples in the units of the problems; NaN where they are not good."""
         high, low = (numpy.ldexp(self.samples[:, :, k : k + 6], self.exponents[:, None, :]) for k in (0, 6))
         total = high + low
         bad = ~self.good

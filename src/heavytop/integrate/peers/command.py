@@ -231,13 +231,6 @@ def number_text(value: Fraction, precision: Precision, hexadecimal: bool = False
     return f"{float(value):.17g}" if precision == DOUBLE else decimal_text(value, precision.digits)
 
 
-def numbers_texts(values: Sequence[Any], precision: Precision, hexadecimal: bool) -> list[str]:
-    """:func:`number_text` of each."""
-    if precision == DOUBLE and not hexadecimal:
-        return [f"{float(value) + 0.0:.17g}" for value in values]
-    return [number_text(Fraction(value), precision, hexadecimal) for value in values]
-
-
 class ProgramRequest:
     """A problem with its times, as a program is asked for it.
 
@@ -290,7 +283,10 @@ class ProgramRequest:
         return self._numbers([rounded(value, self.problem.precision) for value in values])
 
     def _numbers(self, values: Sequence[Any]) -> list[str]:
-        return numbers_texts(values, self.problem.precision, self.hex)
+        precision = self.problem.precision
+        if precision == DOUBLE and not self.hex:
+            return [f"{float(value) + 0.0:.17g}" for value in values]
+        return [number_text(Fraction(value), precision, self.hex) for value in values]
 
 
 class Reply:

@@ -125,8 +125,9 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     if _FITTED.label in section.legend:
         section.legend[_FITTED.label] = section.legend.pop(_FITTED.label)
         section.notes.append(
-            "Dashed, and in words at its end: the fitted law of growth with its exponent, or the rate of an "
-            "exponential, over the span that was fitted, and the 95 % interval as a fan."
+            "Dashed, and in words at its end: the fitted law of growth with its exponent over the span that was "
+            "fitted, and the 95 % interval as a fan. The rate of an exponential is the median over the starts; the "
+            "root mean square follows the fastest of them."
         )
     return section
 
@@ -222,7 +223,7 @@ def through(law: Law, slope: float, fitted: Sequence[tuple[float, float]], grid:
 def _law_short(law: Law) -> str:
     """Few enough letters to stand beside a curve."""
     if law.exponent is None or law.growth == "unresolved":
-        return "no law"
+        return law.growth if law.exponent is None else "unresolved"
     if law.growth == "bounded":
         return law.growth
     return f"e^({law.exponent:.2g} t)" if law.growth == "exponential" else f"{law.growth} ({law.exponent:z.2f})"

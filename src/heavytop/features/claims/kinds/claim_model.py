@@ -28,7 +28,7 @@ from heavytop.measure.scalar import largest, metric, text
 from heavytop.measure.scorer import INTEGRATION_ERROR
 from heavytop.measure.truth import certified, compute
 from heavytop.precision import exact, time_text
-from heavytop.records import Against, Beside, Direction, Metric, Quantity, Row, RowKey, Series, Subject, by_name
+from heavytop.records import HEYOKA, Against, Beside, Direction, Metric, Quantity, Row, RowKey, Series, Subject, by_name
 from heavytop.report.document.document import (
     MOST_PLOTS,
     TIME,
@@ -168,7 +168,8 @@ def _claim_parts(rows: Sequence[Row], quantity: str, source: str) -> Iterator[tu
             yield Key(label, colour, marker, "", old), model_error_series, scale, _symbol(in_format)
         if row.bits == bits and (model_error_series := _series(row, INTEGRATION_ERROR).get(quantity)):
             label = f"integration, {clip(row.integrator, 20)}, {precision}{suffix}"
-            yield Key(label, 0, "o", "", old), model_error_series, 1.0, _symbol(quantity)
+            colour, marker = (0, "o") if subject.name == HEYOKA else (4, "v")
+            yield Key(label, colour, marker, "", old), model_error_series, 1.0, _symbol(quantity)
 
 
 def _symbol(quantity: str) -> str:
