@@ -4,21 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
-from heavytop.top.equations import HEAVY_TOP
+from support.claim_tables import rotation
 
 
 def verdict(zero: str, assume: tuple[str, ...]) -> str:
-    """Of a top that spins about the vertical with the rate 1 + t*zero: true where zero is 0."""
-    table = {
-        "name": "upright",
-        "kind": "motion",
-        "parameters": {"a": ["1/2", "7/8"]},
-        "assume": list(assume),
-        "top": {"inertia": ["2", "2", "3"], "weight": "1", "centre": ["0", "0", "1"]},
-        "motion": {"omega": ["0", "0", f"1 + t*({zero})"], "gamma": ["0", "0", "1"]},
-    }
-    return audit_claim(claim_from_table(table, "test"), HEAVY_TOP).verdict
+    return rotation(f"1 + t*({zero})", assume, parameters={"a": ["1/2", "7/8"]}).verdict
 
 
 TO_4, TO_1 = ("a > 0", "a < 4"), ("a > 0", "a < 1")

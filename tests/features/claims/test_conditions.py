@@ -13,6 +13,7 @@ from heavytop.features.claims.algebra.conditions import written
 from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.features.claims.audit.judge import Audit
 from heavytop.top.equations import HEAVY_TOP
+from support.claim_tables import open_conditions
 
 
 def upright(spin: str, domain: str = "all", **parts) -> dict:
@@ -40,10 +41,6 @@ def free(value: str, where: tuple[str, ...] = (), kind: str = "integral", state:
 
 def judged(table: dict) -> Audit:
     return audit_claim(claim_from_table(table, "test"), HEAVY_TOP)
-
-
-def open_conditions(report: Audit) -> str:
-    return "; ".join(f"{c.text} {c.reason}" for row in report.rows for c in row.conditions if not c.discharged)
 
 
 @pytest.mark.slow

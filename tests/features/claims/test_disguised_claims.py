@@ -15,6 +15,7 @@ from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.structure import Defined, at_values, rate_along
 from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.top.equations import HEAVY_TOP
+from support.claim_tables import energy
 
 T = sympy.Symbol("t", real=True)
 A, B, C = sympy.symbols("a b c", real=True)
@@ -33,15 +34,7 @@ def test_a_part_of_the_family_is_decided_and_nothing_false_holds():
 
 
 def said(x: str, **changes: object) -> str:
-    """The verdict on Euler's energy plus (x − 1) Ω1, which is constant where x is 1."""
-    table = {
-        "name": "x",
-        "kind": "integral",
-        "top": {"inertia": ["3", "2", "1"], "weight": "0", "centre": ["0", "1", "0"]},
-        "integral": {"value": f"(3*Omega1^2 + 2*Omega2^2 + Omega3^2) + ({x} - 1)*Omega1"},
-        **changes,
-    }
-    return audit_claim(claim_from_table(table, "x"), HEAVY_TOP).verdict
+    return energy(x, **changes).verdict
 
 
 # --- orders ---------------------------------------------------------------------------------------------------------

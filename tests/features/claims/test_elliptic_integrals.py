@@ -10,7 +10,7 @@ from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.reader import parse, symbol
 from heavytop.features.claims.algebra.structure import rate_along
-from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
+from support.claim_tables import rotation
 
 U, M, N = sympy.symbols("u m n", real=True)
 NAMES = {str(x): symbol(x) for x in (U, M, N)} | {"pi": symbol(sympy.pi)}
@@ -119,15 +119,7 @@ def test_derivatives_are_those_of_the_values(text: str, rate: str) -> None:
 def test_degenerate_parameters_and_poles_are_conditions(
     rate: str, parameter: str, assume: list[str], missing: str
 ) -> None:
-    table = {
-        "name": "x",
-        "kind": "motion",
-        "parameters": {"a": parameter},
-        "assume": assume,
-        "top": {"inertia": ["1", "2", "3"], "weight": "0", "centre": ["0", "0", "0"]},
-        "motion": {"omega": ["0", "0", rate], "gamma": ["0", "0", "1"]},
-    }
-    report = audit_claim(claim_from_table(table, "x"))
+    report = rotation(rate, assume, parameters={"a": parameter})
     left = [c.text for row in report.rows for c in row.conditions if not c.discharged]
     assert (report.verdict == "holds") is not bool(missing)
     assert any(missing in text for text in left) if missing else not left
@@ -148,15 +140,7 @@ def test_degenerate_parameters_and_poles_are_conditions(
     ],
 )
 def test_degenerate_values_nomes_and_later_branches_are_decided(text: str, expected: str) -> None:
-    table = {
-        "name": "x",
-        "kind": "motion",
-        "parameters": {"a": "1/2"},
-        "assume": ["0 < a < 1"],
-        "top": {"inertia": ["1", "2", "3"], "weight": "0", "centre": ["0", "0", "0"]},
-        "motion": {"omega": ["0", "0", f"1 + t*({text})"], "gamma": ["0", "0", "1"]},
-    }
-    assert audit_claim(claim_from_table(table, "x")).verdict == expected
+    assert rotation(f"1 + t*({text})", ["0 < a < 1"], parameters={"a": "1/2"}).verdict == expected
 
 
 @pytest.mark.parametrize("text", ["am(1, 2)", "ellipticF(1, 1)", "ellipticPi(2, 1, 1/2)", "modulus(2)"])
@@ -165,11 +149,4 @@ def test_beyond_the_parameters_there_is_no_value(text: str) -> None:
 
 
 def test_a_parameter_may_have_the_name_of_an_elliptic_function() -> None:
-    table = {
-        "name": "x",
-        "kind": "motion",
-        "parameters": {"nome": "1/2"},
-        "top": {"inertia": ["1", "2", "3"], "weight": "0", "centre": ["0", "0", "0"]},
-        "motion": {"omega": ["0", "0", "nome"], "gamma": ["0", "0", "1"]},
-    }
-    assert audit_claim(claim_from_table(table, "x")).verdict == "holds"
+    assert rotation("nome", parameters={"nome": "1/2"}).verdict == "holds"

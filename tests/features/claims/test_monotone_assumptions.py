@@ -2,21 +2,12 @@
 
 import pytest
 
-from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
-from heavytop.top.equations import HEAVY_TOP
+from support.claim_tables import rotation
 
 
 def verdict(root: str, assume: tuple[str, ...]) -> str:
-    """Of a top that spins about the vertical with a rate that is real where ``root`` is not negative."""
-    table = {
-        "name": "upright",
-        "kind": "motion",
-        "parameters": {"a": ["3/4", "7/8"], "b": ["1/2", "5/8"]},
-        "assume": list(assume),
-        "top": {"inertia": ["2", "2", "3"], "weight": "1", "centre": ["0", "0", "1"]},
-        "motion": {"omega": ["0", "0", f"sqrt({root})"], "gamma": ["0", "0", "1"]},
-    }
-    return audit_claim(claim_from_table(table, "test"), HEAVY_TOP).verdict
+    """The verdict on a rate that is real where ``root`` is not negative."""
+    return rotation(f"sqrt({root})", assume, parameters={"a": ["3/4", "7/8"], "b": ["1/2", "5/8"]}).verdict
 
 
 @pytest.mark.slow

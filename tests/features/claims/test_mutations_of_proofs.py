@@ -14,9 +14,8 @@ from heavytop.features.claims.algebra.reader import assume
 from heavytop.features.claims.algebra.ring import used
 from heavytop.features.claims.algebra.signs import Sign
 from heavytop.features.claims.algebra.statement import ALL, Flow, Formulas, Setting, Statement
-from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.features.claims.audit.context import STATE
-from heavytop.top.equations import HEAVY_TOP
+from support.claim_tables import energy
 
 T = sympy.Symbol("t", real=True)
 A, B, C = SYMBOLS = sympy.symbols("a b c", real=True)
@@ -30,16 +29,8 @@ def statement(residual: sympy.Expr, flow: Flow | None = None, needs: frozenset[N
     return Statement("", 0, "", ALL, residual, "", Formulas((residual,), needs), flow)
 
 
-def holds(x: str, divisor: str = "1", **given: object) -> bool:
-    """Whether Euler's energy over a divisor plus (x − 1) Ω1 is found to be constant."""
-    table = {
-        "name": "x",
-        "kind": "integral",
-        "top": {"inertia": ["3", "2", "1"], "weight": "0", "centre": ["0", "1", "0"]},
-        "integral": {"value": f"(3*Omega1^2 + 2*Omega2^2 + Omega3^2)/({divisor}) + ({x} - 1)*Omega1"},
-        **given,
-    }
-    return audit_claim(claim_from_table(table, "x"), HEAVY_TOP).verdict == "holds"
+def holds(x: str, divisor: str = "1", **parts: object) -> bool:
+    return energy(x, divisor, **parts).verdict == "holds"
 
 
 # --- what an assumption needs -----------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ import pytest
 from heavytop.errors import InputError
 from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.features.claims.audit.judge import Audit
+from support.claim_tables import open_conditions
 
 EXAMPLE = files("heavytop.features.claims") / "examples" / "pendulum-quadrature.toml"
 
@@ -35,10 +36,6 @@ def turning(angle: str, time: str, *where: str) -> dict[str, Any]:
         "quadrature": {"variable": "u", "time": time, "where": list(where)},
         "motion": {"omega": ["0", "0", "1"], "gamma": [f"cos({angle})", f"-sin({angle})", "0"]},
     }
-
-
-def open_conditions(report: Audit) -> str:
-    return "; ".join(f"{c.text}: {c.reason}" for row in report.rows for c in row.conditions if not c.discharged)
 
 
 def test_the_pendulum_holds_between_its_turning_points() -> None:

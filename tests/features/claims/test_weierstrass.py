@@ -12,26 +12,9 @@ from heavytop.errors import InputError
 from heavytop.features.claims.algebra.elliptic import wp, wpprime
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
-from heavytop.features.claims.audit.judge import Audit
+from support.claim_tables import open_conditions, rotation
 
 U, G2, G3 = sympy.symbols("u g2 g3", real=True)
-
-
-def _audit(rate: str, parameters: dict[str, Any] | None = None, assume: tuple[str, ...] = (), **parts: Any) -> Audit:
-    """A permanent rotation at a rate that is 1 if the formula is right."""
-    table = {
-        "name": "x",
-        "kind": "motion",
-        "parameters": parameters or {},
-        "assume": list(assume),
-        "top": {"inertia": ["1", "2", "3"], "weight": "0", "centre": ["0", "0", "0"]},
-        "motion": {"omega": ["0", "0", rate], "gamma": ["0", "0", "1"]},
-    }
-    return audit_claim(claim_from_table(table | parts, "x"))
-
-
-def _open(report: Audit) -> str:
-    return "; ".join(c.text for row in report.rows for c in row.conditions if not c.discharged)
 
 
 def _zero(p: str, g2: str, g3: str) -> str:
@@ -40,18 +23,18 @@ def _zero(p: str, g2: str, g3: str) -> str:
 
 
 def test_the_branch_without_poles_satisfies_its_equation_where_the_roots_are_three() -> None:
-    assert _audit(_zero("wp3", "4", "1")).verdict == "holds"
-    assert _audit(_zero("wp3", "4", "1") + " + wp3(t, 4, 1)").verdict == "refuted"
+    assert rotation(_zero("wp3", "4", "1")).verdict == "holds"
+    assert rotation(_zero("wp3", "4", "1") + " + wp3(t, 4, 1)").verdict == "refuted"
     samples = {"a": ["4", "5"], "b": ["1", "-1"]}
-    assert "a^3 - 27*b^2 > 0" in _open(_audit(_zero("wp3", "a", "b"), samples))
-    assert _audit(_zero("wp3", "a", "b"), samples, ("a^3 > 27*b^2",)).verdict == "holds"
+    assert "a^3 - 27*b^2 > 0" in open_conditions(rotation(_zero("wp3", "a", "b"), parameters=samples))
+    assert rotation(_zero("wp3", "a", "b"), ["a^3 > 27*b^2"], parameters=samples).verdict == "holds"
 
 
 @pytest.mark.parametrize(("g2", "g3"), [("3", "1"), ("0", "0"), ("1", "3")])
 def test_colliding_and_complex_roots_leave_no_bounded_branch(g2: str, g3: str) -> None:
-    report = _audit(_zero("wp3", g2, g3))
+    report = rotation(_zero("wp3", g2, g3))
     assert report.verdict == "undecided"
-    assert "> 0" in _open(report)
+    assert "> 0" in open_conditions(report)
 
 
 @pytest.mark.parametrize(
@@ -59,25 +42,25 @@ def test_colliding_and_complex_roots_leave_no_bounded_branch(g2: str, g3: str) -
 )
 @pytest.mark.parametrize("domain", ["all", "t>0"])
 def test_poles_on_the_real_line_are_never_passed_over(rate: str, domain: str) -> None:
-    report = _audit(rate, domain=domain)
+    report = rotation(rate, domain=domain)
     assert report.verdict == "undecided"
-    assert "t is not a period of wp(u, " in _open(report)
+    assert "t is not a period of wp(u, " in open_conditions(report)
 
 
 def test_of_numbers_poles_are_excluded_by_balls() -> None:
-    assert _audit("1 + wp(1, 4, 1) - wp(1, 4, 1)").verdict == "holds"
-    assert _audit("1 + 0*wp(0, 4, 1)").verdict == "undecided"
+    assert rotation("1 + wp(1, 4, 1) - wp(1, 4, 1)").verdict == "holds"
+    assert rotation("1 + 0*wp(0, 4, 1)").verdict == "undecided"
 
 
 @pytest.mark.parametrize(
     "rate", ["1 + wp3(t, 4, 1) - wp3(t, 4, 999/1000)", "wp3(t, 4, 1)", "1 + wp(t, 4, 1) - wp(2*t, 4, 1)"]
 )
 def test_what_is_false_is_refuted(rate: str) -> None:
-    assert _audit(rate).verdict == "refuted"
+    assert rotation(rate).verdict == "refuted"
 
 
 def test_invariants_that_move_are_not_proven() -> None:
-    assert _audit("1 + wp3(t, 4 + t^2, 1)").verdict != "holds"
+    assert rotation("1 + wp3(t, 4 + t^2, 1)").verdict != "holds"
 
 
 @pytest.mark.parametrize(("g2", "g3"), [(4, 1), (4, -1), (5, 0), (1, 3), (-2, 1), (0, -2), (-3, 0)])

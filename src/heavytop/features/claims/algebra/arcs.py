@@ -83,14 +83,14 @@ class Arcs:
         arcs = [*alike, index]
         if is_log:
             return self._form_of_logarithm(arcs)
-        factors = _integer_relation([*(self._values(arc) for arc in arcs), [_pi()] * _SAMPLES])
+        pi = field.enter(sympy.pi).numerator
+        factors = _integer_relation([self._values(arc) for arc in (*arcs, *used(pi))])
         if factors is None or not factors[-2]:
             return None
         weights = {arc: factor for arc, factor in zip(arcs, factors[:-1], strict=True) if factor}
         if not self._is_proven(weights, -factors[-1]):
             return None
-        gens, pi = field.tower.gens, field.enter(sympy.pi).numerator
-        total = pi * factors[-1]
+        gens, total = field.tower.gens, pi * factors[-1]
         for arc, factor in weights.items():
             if arc != index:
                 total += gens[arc] * factor
@@ -187,11 +187,6 @@ class Arcs:
         with working_precision(NUMBER_BITS):
             total = sum((values[arc] * weight for arc, weight in weights.items()), arb(0))
             return bool(abs(total - arb.pi() * angle.numerator / angle.denominator) < 3)
-
-
-def _pi() -> arb:
-    with working_precision(NUMBER_BITS):
-        return arb.pi()
 
 
 def _integer_relation(values: Sequence[Sequence[arb]]) -> list[int] | None:

@@ -76,17 +76,15 @@ class Need:
             return None
         if not ball.is_finite():
             return None
-        if ball.is_zero() or (ball.contains(0) and self._is_zero_at(values)):
+        e = self.expression
+        is_rational = ball.contains(0) and e.is_rational_function(*e.free_symbols)
+        if ball.is_zero() or (is_rational and is_exactly_zero(e, values)):
             return self.kind is ConditionKind.NONNEGATIVE
         if self.kind is ConditionKind.NONZERO:
             return True if not ball.contains(0) else None
         above = ball > 0 if self.kind is ConditionKind.POSITIVE else ball >= 0
         below = ball <= 0 if self.kind is ConditionKind.POSITIVE else ball < 0
         return True if above else False if below else None
-
-    def _is_zero_at(self, values: Mapping[sympy.Symbol, Fraction]) -> bool:
-        e = self.expression
-        return bool(e.is_rational_function(*e.free_symbols) and is_exactly_zero(e, values))
 
 
 @lru_cache(maxsize=10_000)

@@ -211,20 +211,12 @@ def _amplitude(u: arb, m: arb) -> arb:
     return turns * arb.pi() + arb.atan2(sine, cosine) if sine.is_finite() else _NAN
 
 
-def _third(n: arb, phi: arb, m: arb) -> arb:
-    return acb.elliptic_pi_inc(acb(n), acb(phi), acb(m)).real if m < 1 and n < 1 else _NAN
-
-
 def _neville(u: arb, m: arb) -> arb:
     if m.is_zero() or not (m > 0 and m < 1):
         return arb(1) if m.is_zero() else _NAN
     k = acb(m).elliptic_k().real
     ratio = acb(0, acb(1 - m).elliptic_k().real / k)
     return arb((thetas(acb(u / (2 * k)), ratio)[3] / thetas(acb(0), ratio)[3]).real)
-
-
-def _modulus(q: arb) -> arb:
-    return q if q.is_zero() else acb(0, -q.log() / arb.pi()).modular_lambda().real if q > 0 and q < 1 else _NAN
 
 
 def _lattice(g2: arb, g3: arb) -> tuple[arb, acb] | None:
@@ -261,9 +253,11 @@ VALUES: dict[str, Callable[..., arb]] = {
     "am": _amplitude,
     "ellipticF": lambda phi, m: acb.elliptic_f(acb(phi), acb(m)).real if m < 1 else _NAN,
     "ellipticE": lambda phi, m: acb.elliptic_e_inc(acb(phi), acb(m)).real if m <= 1 else _NAN,
-    "ellipticPi": _third,
+    "ellipticPi": lambda n, phi, m: acb.elliptic_pi_inc(acb(n), acb(phi), acb(m)).real if m < 1 and n < 1 else _NAN,
     "thetan": _neville,
-    "modulus": _modulus,
+    "modulus": lambda q: (
+        q if q.is_zero() else acb(0, -q.log() / arb.pi()).modular_lambda().real if q > 0 and q < 1 else _NAN
+    ),
     **{name: partial(_of_lattice, name) for name in (*WEIERSTRASS, "wzeta", "wsigma", "wzeta3", "wsigma3")},
 }
 """Each function of balls, as a ball that is proven to hold it, at the working precision."""

@@ -143,9 +143,7 @@ class Transcendental:
         """An exponential of known sign of the argument lies above or below 1."""
         if sign:
             excess = self._tower.add(f"excess over 1 of x{index}", constant=False, sign=1)
-            self._tower.signs.declare_form(index, self._tower.gens[excess] + 1)
-            if sign < 0:
-                self._tower.signs.declare_below_one(index)
+            self._tower.signs.declare_form(index, self._tower.gens[excess] + 1, below_one=sign < 0)
 
     def _multiple(self, kind: str, argument: Quotient, make: Callable[[Quotient], int]) -> tuple[int, int]:
         """(generator, n): the argument is n times the generator's base.
@@ -184,9 +182,10 @@ class Transcendental:
         return total
 
     def _circle_of_term(self, value: Quotient) -> Circle:
-        known = self._circle_of_number(value)
-        if known is not None:
-            return known
+        is_number = used(value.numerator) <= self._tower.signs.numbers.keys()
+        turn = self._tower.ratio(value, self._field.enter(sympy.pi)) if is_number else None
+        if turn is not None and 12 % turn.denominator == 0:
+            return self.circle_of_turn(turn)
         inverse = self._inverse_multiple(value)
         if inverse is not None:
             return self._times(*inverse)
@@ -204,14 +203,8 @@ class Transcendental:
         index, multiple = self._multiple("circle", value, make)
         return self._times((self._generator(index), self._generator(self._tower.signs.circles[index])), multiple)
 
-    def _circle_of_number(self, value: Quotient) -> Circle | None:
-        """(sin, cos) of a multiple of π/12, in square roots."""
-        is_number = used(value.numerator) <= self._tower.signs.numbers.keys()
-        turn = self._tower.ratio(value, self._field.enter(sympy.pi)) if is_number else None
-        return None if turn is None or 12 % turn.denominator else self.circle_of_turn(turn)
-
     def circle_of_turn(self, turn: Fraction) -> Circle:
-        """(sin, cos) of a multiple of π; the denominator of ``turn`` divides 12."""
+        """(sin, cos) of a multiple of π, in square roots; the denominator of ``turn`` divides 12."""
         angle = sympy.pi * sympy.Rational(turn.numerator, turn.denominator)
         return self._field.enter(sympy.sin(angle)), self._field.enter(sympy.cos(angle))
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import wraps
 
 import sympy
 from flint import fmpq_mpoly
@@ -59,6 +60,20 @@ class Condition:
     assumption: str = ""
 
 
+def _answered_once(question: Callable[[Region, fmpq_mpoly], bool]) -> Callable[[Region, fmpq_mpoly], bool]:
+    """The question about a polynomial, answered once for each; while it is looked into the answer is no."""
+
+    @wraps(question)
+    def answer(region: Region, p: fmpq_mpoly) -> bool:
+        answers, key = region.answers.setdefault(question.__name__, {}), str(p)
+        if key not in answers:
+            answers[key] = False
+            answers[key] = question(region, p)
+        return answers[key]
+
+    return answer
+
+
 class Region:
     """A field over one part of the domain, with what is known to vanish nowhere or on no open set there."""
 
@@ -68,9 +83,7 @@ class Region:
         self._setting = setting
         self._flow = statement.flow
         self.sample_points = [point for point in sample_points if self._holds(point)]
-        self._thin: dict[str, bool] = {}
-        self._thin_for_each: dict[str, bool] = {}
-        self._kept: dict[str, bool] = {}
+        self.answers: dict[str, dict[str, bool]] = {}
         self._divisors: dict[tuple[bool, str], bool] = {}
         self._needs = statement.formulas.needs
         self.regularity = Regularity(field, self.is_nowhere_zero)
@@ -102,15 +115,12 @@ class Region:
     def _is_apart(self, p: fmpq_mpoly) -> bool:
         return self.field.never_zero_on_relations(p)
 
+    @_answered_once
     def is_kept(self, p: fmpq_mpoly) -> bool:
         """p' = c p along the flow, with p and c continuous, off a set without interior: p keeps its sign."""
-        key = str(p)
-        if key not in self._kept:
-            self._kept[key] = False  # what is asked of p on the way to the answer about p
-            self._kept[key] = self._flow is not None and self._is_kept(p, self._flow)
-        return self._kept[key]
-
-    def _is_kept(self, p: fmpq_mpoly, flow: Flow) -> bool:
+        flow = self._flow
+        if flow is None:
+            return False
         try:
             expression = self.field.expression(self.field.tower.polynomial(p))
             if not expression.free_symbols & flow.state:
@@ -156,12 +166,10 @@ class Region:
                     return self.is_kept(p)
         return False
 
+    @_answered_once
     def is_zero_nowhere_dense(self, p: fmpq_mpoly) -> bool:
         """0 on a set without interior at most."""
-        key = str(p)
-        if key not in self._thin:
-            self._thin[key] = all(self._is_thin(factor) for factor, _ in self.field.tower.signs.factors(p)[1])
-        return self._thin[key]
+        return all(map(self._is_thin, self._factors(p)))
 
     def _is_thin(self, p: fmpq_mpoly) -> bool:
         tower, square = self.field.tower, self._square(p)
@@ -174,10 +182,6 @@ class Region:
         if not self.is_connected(used(p)) or self.everywhere.obstacle_of_generators(used(p), analytic=True):
             return False
         return any(self._is_nonzero_at(p, point) for point in self.sample_points)
-
-    def _has_parameters(self, p: fmpq_mpoly) -> bool:
-        inside = set().union(*(self.field.meaning(index).free_symbols for index in used(p)))
-        return bool(inside & self._setting.parameters)
 
     def is_connected(self, indices: set[int], fixed: Collection[sympy.Symbol] = ()) -> bool:
         """Linear inequalities bound a convex domain of the symbols in these generators, and of those bound to them.
@@ -257,12 +261,7 @@ class Region:
         return () if self._flow is None else self._flow.always
 
     def _discharge(self, need: Need) -> str:
-        plain = sign_of(need.expression)
-        if (
-            plain.strict
-            if need.kind is ConditionKind.NONZERO
-            else plain.value > 0 and (plain.strict or need.kind is ConditionKind.NONNEGATIVE)
-        ):
+        if need.kind.is_met_by(sign_of(need.expression)):
             return _EVERYWHERE
         try:
             value = self.field.enter(need.expression)
@@ -304,21 +303,19 @@ class Region:
     def _factors(self, p: fmpq_mpoly) -> list[fmpq_mpoly]:
         return [factor for factor, _ in self.field.tower.signs.factors(p)[1]]
 
+    @_answered_once
     def _is_thin_for_each(self, p: fmpq_mpoly) -> bool:
         """0 on a set without interior at most, whatever the parameters are."""
-        key = str(p)
-        if key not in self._thin_for_each:
-            square = self._square(p)
-            self._thin_for_each[key] = (
-                all(map(self._is_thin_for_each, self._factors(square)))
-                if square is not None
-                else self.field.tower.signs.of(p).strict
-                or (
-                    self.is_for_no_parameters(p)
-                    and (self.is_zero_nowhere_dense(p) or (self._has_parameters(p) and self._is_analytic(p)))
-                )
-            )
-        return self._thin_for_each[key]
+        square = self._square(p)
+        if square is not None:
+            return all(map(self._is_thin_for_each, self._factors(square)))
+        if self.field.tower.signs.of(p).strict:
+            return True
+        symbols = set().union(*(self.field.meaning(index).free_symbols for index in used(p)))
+        if not self.is_for_no_parameters(p):
+            return False
+        has_parameters = bool(symbols & self._setting.parameters)
+        return self.is_zero_nowhere_dense(p) or (has_parameters and self._is_analytic(p))
 
     def _square(self, p: fmpq_mpoly) -> fmpq_mpoly | None:
         """The radicand of a polynomial that is a root by itself; None of another."""

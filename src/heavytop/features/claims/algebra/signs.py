@@ -99,18 +99,15 @@ class Signs:
         self.pi: int | None = None
         self.turns: dict[int, tuple[Fraction, Fraction]] = {}
 
-    def declare_form(self, index: int, form: fmpq_mpoly) -> None:
-        """Generator ``index`` is ``form``, a polynomial in generators of known sign."""
+    def declare_form(self, index: int, form: fmpq_mpoly, *, below_one: bool = False) -> None:
+        """Generator ``index`` is ``form``, a polynomial in generators of known sign; below_one: 1/x is, 0 < x ≤ 1."""
         self._forms[index] = form
+        self._below_one |= {index} if below_one else set()
         self._known.clear()
 
     def can_have_form(self, index: int, form: fmpq_mpoly) -> bool:
         """Whether ``form`` may be declared: it is the first, and nothing in it has the form of its reciprocal."""
         return index not in self._forms and not self._below_one & used(form)
-
-    def declare_below_one(self, index: int) -> None:
-        """1/x is the form of generator ``index``: it lies in (0, 1]."""
-        self._below_one.add(index)
 
     def declare(self, p: fmpq_mpoly, sign: Sign) -> None:
         """The claim assumes this sign of ``p``: it is that of the factors whose sign nothing else tells.

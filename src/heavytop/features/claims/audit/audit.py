@@ -14,7 +14,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import msgspec
 
@@ -23,7 +23,7 @@ from heavytop.errors import HeavyTopError, InputError, invalid, meant, prefixed,
 from heavytop.features.claims.audit.components import UserComponent
 from heavytop.features.claims.audit.context import ClaimFile, FileClaim
 from heavytop.features.claims.audit.guard import Answer, AuditEnded, in_time, limit_process
-from heavytop.features.claims.audit.judge import Audit, Auditable, StatementVerdict, judge, verdict_of
+from heavytop.features.claims.audit.judge import Audit, StatementVerdict, judge, verdict_of
 from heavytop.features.claims.audit.stability import UserStability
 from heavytop.features.claims.audit.user_claims import UserIntegral, UserMotion
 from heavytop.features.claims.audit.values import ValueClaim, ValueFile
@@ -31,12 +31,17 @@ from heavytop.features.claims.library.entry import FOLDER, Entry, Verdict, file_
 from heavytop.guard import processors
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System, system
 
+if TYPE_CHECKING:
+    from heavytop.features.claims.library.ershkov_audit import GeneralClaim, PartialClaim
+
 # Claims that a user writes in TOML: a motion, a first integral, an invariant relation, or numbers.
 #
 # The format is that of docs/claims-in-toml.md.  Formulas go through :mod:`heavytop.features.claims.algebra.reader`;
 # nothing in a file is ever evaluated as code.
 
 
+Auditable: TypeAlias = "UserMotion | UserIntegral | PartialClaim | GeneralClaim"
+"""A claim whose formulas can be put into equations."""
 _TABLES: dict[str, tuple[str, Callable[[ClaimFile], Auditable]]] = {
     "motion": ("motion", UserMotion),
     "component": ("component", UserComponent),

@@ -184,42 +184,33 @@ _ORDER = (0, 3, 4, 3, 1, 5, 4, 5, 2)
 _REMEDY = "Give 3 principal moments, 6 entries I11, I22, I33, I12, I13, I23 of the tensor, or 9, row by row."
 
 
-@dataclass(frozen=True, slots=True)
-class TensorTexts:
-    """The entries as they are written: three, or nine row by row."""
+def read_tensor(inertia: Sequence[str | list[str]]) -> tuple[str, ...]:
+    """The entries of ``inertia`` as they are written, three, or nine row by row.
 
-    texts: tuple[str, ...]
-
-    @property
-    def diagonal(self) -> tuple[str, ...]:
-        """The moments about the axes."""
-        return self.texts if len(self.texts) == 3 else self.texts[::4]
-
-    def of(self, entries: Sequence[sympy.Expr]) -> tuple[sympy.Expr | tuple[sympy.Expr, ...], ...]:
-        """Three moments, or three rows; raises InputError for a tensor that is not symmetric."""
-        if len(entries) == 3:
-            return tuple(entries)
-        rows = tuple(tuple(entries[3 * i : 3 * i + 3]) for i in range(3))
-        for i, j in combinations(range(3), 2):
-            if sympy.expand(rows[i][j] - rows[j][i]) != 0:
-                pair = f"I{i + 1}{j + 1} = {self.texts[3 * i + j]}, I{j + 1}{i + 1} = {self.texts[3 * j + i]}"
-                raise InputError(f"The tensor of inertia is not symmetric: {pair}.", _REMEDY)
-        # off the diagonal 0: the axes are principal
-        if all(rows[i][j] == 0 for i, j in combinations(range(3), 2)):
-            return rows[0][0], rows[1][1], rows[2][2]
-        return rows
-
-
-def read_tensor(inertia: Sequence[str | list[str]]) -> TensorTexts:
-    """The entries of ``inertia``; raises InputError unless they are 3, 6 or 9, or 3 rows of 3."""
+    Raises InputError unless they are 3, 6 or 9, or 3 rows of 3.
+    """
     if all(isinstance(part, list) for part in inertia):
         if len(inertia) != 3 or any(len(row) != 3 for row in inertia):
             raise InputError("top.inertia: the rows are not 3 of 3.", _REMEDY)
-        return TensorTexts(tuple(text for row in inertia for text in row))
+        return tuple(text for row in inertia for text in row)
     if not all(isinstance(part, str) for part in inertia) or len(inertia) not in (3, 6, 9):
         raise InputError(f"top.inertia: {len(inertia)} entries.", _REMEDY)
     texts = tuple(str(part) for part in inertia)
-    return TensorTexts(tuple(texts[index] for index in _ORDER) if len(texts) == 6 else texts)
+    return tuple(texts[index] for index in _ORDER) if len(texts) == 6 else texts
+
+
+def tensor_of(entries: Sequence[sympy.Expr], texts: Sequence[str]) -> tuple[sympy.Expr | tuple[sympy.Expr, ...], ...]:
+    """Three moments, or three rows; raises InputError, with its texts, for a tensor that is not symmetric."""
+    if len(entries) == 3:
+        return tuple(entries)
+    rows = tuple(tuple(entries[3 * i : 3 * i + 3]) for i in range(3))
+    for i, j in combinations(range(3), 2):
+        if sympy.expand(rows[i][j] - rows[j][i]) != 0:
+            pair = f"I{i + 1}{j + 1} = {texts[3 * i + j]}, I{j + 1}{i + 1} = {texts[3 * j + i]}"
+            raise InputError(f"The tensor of inertia is not symmetric: {pair}.", _REMEDY)
+    # off the diagonal 0: the axes are principal
+    is_diagonal = all(rows[i][j] == 0 for i, j in combinations(range(3), 2))
+    return (rows[0][0], rows[1][1], rows[2][2]) if is_diagonal else rows
 
 
 def minors(inertia: Sequence[sympy.Expr | tuple[sympy.Expr, ...]]) -> tuple[sympy.Expr, ...]:
@@ -314,9 +305,10 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
             raise InputError(f"The name {name!r} is taken.", f"Taken are {', '.join(sorted(reserved))}.")
     texts = list(assumptions(content.assume))
     tensor = read_tensor(content.top.inertia)
+    diagonal = tensor if len(tensor) == 3 else tensor[::4]
     # the moments of inertia of a top are positive, said or not
     positive = {left for left, right, kind in texts if right == "0" and kind is ConditionKind.POSITIVE}
-    positive |= {text.strip() for text in tensor.diagonal}
+    positive |= {text.strip() for text in diagonal}
     symbols = {
         name: sympy.Symbol(name, positive=True) if name in positive else sympy.Symbol(name, real=True)
         for name in content.parameters
@@ -329,7 +321,7 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     compared = [(a.expression, b.expression, kind) for a, b, kind in sides]
     needs = needs_of(formula for a, b, _ in sides for formula in (a, b))
     top = content.top
-    moments = [parse(text, names, "top.inertia") for text in tensor.texts]
+    moments = [parse(text, names, "top.inertia") for text in tensor]
     arm = [*three(top.centre, names, "top.centre"), parse(top.weight, names, "top.weight")]
     rotor = parse(top.rotor, names, "top.rotor") if isinstance(top.rotor, str) else None
     carried = three(top.rotor, names, "top.rotor") if isinstance(top.rotor, list) else ()
@@ -340,7 +332,7 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     _check_constant("top.rotor", carried, _OF_THE_TOP, variables)
     _check_constant("relations", relations, _OF_PARAMETERS, variables)
     weight = arm.pop()
-    inertia = tensor.of([part.expression for part in moments])
+    inertia = tensor_of([part.expression for part in moments], tensor)
     centre = tuple(part.expression for part in arm)
     context = Context(
         names,

@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any, Protocol
+from typing import Any
 
 import msgspec
 import sympy
@@ -28,7 +28,6 @@ from heavytop.features.claims.algebra.prover import Condition, Prover
 from heavytop.features.claims.algebra.ring import Quotient, Unprovable
 from heavytop.features.claims.algebra.statement import Formulas, Setting, Statement
 from heavytop.features.claims.library.entry import Entry
-from heavytop.top.equations import System
 
 VERDICTS = {True: "holds", False: "refuted", None: "undecided"}
 ABOUT = {
@@ -301,40 +300,3 @@ def _product_text(factor: str, name: str) -> str:
     if factor in ("1", "-1"):
         return factor.removesuffix("1") + name
     return f"{factor}*{name}" if simple or re.fullmatch(r"-?\d+(/\d+)?", factor) else f"({factor})*{name}"
-
-
-# What can be audited: a claim as statements.
-
-
-class Auditable(Protocol):
-    """A claim whose formulas can be put into equations."""
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def source(self) -> str: ...
-
-    @property
-    def kind(self) -> str: ...
-
-    @property
-    def entry(self) -> Entry | None: ...
-
-    @property
-    def setting(self) -> Setting: ...
-
-    def about(self, asked: System | None) -> System:
-        """The system that it is judged about, where that one is asked for, or none; raises InputError for another."""
-        ...
-
-    def statements(self, system: System) -> list[Statement]:
-        """Every equation that the claim should satisfy as a motion of ``system``, and its own steps."""
-        ...
-
-    def explain(self, about: System, rows: Sequence[StatementVerdict]) -> tuple[list[ExplanationStep], tuple[str, ...]]:
-        """The steps that explain the verdict, and the names of the systems whose motions the claim is.
-
-        rows: the verdicts about the system ``about``, so that they need not be found again.
-        """
-        ...
