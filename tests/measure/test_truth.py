@@ -13,6 +13,7 @@ from heavytop.exact.enclosure import run as validated
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.integrate.heyoka.motions import propagate
+from heavytop.integrate.multiword import motions
 from heavytop.integrate.multiword.motions import integrate_to_samples
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure import truth as truths
@@ -226,7 +227,7 @@ def test_one_late_sample_is_not_computed_where_no_digit_is_left_on_the_way(
         steps += run.steps
         return run
 
-    monkeypatch.setattr(truths, "integrate_to_samples", counted)
+    monkeypatch.setattr(motions, "integrate_to_samples", counted)
     answer = truth(chaotic(precision), [Fraction(horizon)])
     assert isinstance(answer, str)
     far = abs(horizon) > 10**20

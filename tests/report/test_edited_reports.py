@@ -1,5 +1,6 @@
 """A report that was weakened is never the same, or better: a few edits of `validation/edited_reports.py`, and edges."""
 
+from collections.abc import Callable
 from copy import deepcopy
 from pathlib import Path
 from random import Random
@@ -573,3 +574,48 @@ def test_the_numbers_of_formulas_and_of_runs_are_those_of_their_series(measure, 
     series = {name: Series(TIMES, values) for name, values in ends.items()}
     made = row(measure=measure, finite=measure == "work_precision", metrics=known | metrics, series=series)
     assert [problem.partition(":")[0] for problem in contradictions(made)] == ([field] if field else [])
+
+
+def _compared_both_ways(start: Path, candidate: Path) -> list[object]:
+    """The comparison of two reports row by row as they are read, and of both read whole; or that it is refused."""
+    results: list[object] = []
+    for read in (store.read_brief, store.read):
+        try:
+            results.append(compare(read(start), read(candidate), Policy()).to_json())
+        except InputError:
+            results.append("refused")
+    return results
+
+
+def _with_seconds(line: str, seconds: str) -> str:
+    head, _, rest = line.partition('"seconds":{')
+    return f'{head}"seconds":{seconds}{rest[rest.index("}") + 1 :]}'
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda line: line,
+        lambda line: _with_seconds(line, '{"compile":0.1,"run":9.0,"least":8.0,"band":0.02}'),
+        lambda line: _with_seconds(line, '{"compile":0.1,"run":7.0,"least":8.0}'),  # faster than its fastest run
+        lambda line: _with_seconds(line, '{"run":-1.0}'),
+        lambda line: _with_seconds(line, "{}"),
+        lambda line: line.replace('"steps":', '"steps":1', 1),
+        lambda line: line.replace('"key":', '"other":{"seconds":{"run":1e9}},"key":', 1),
+        lambda line: line.replace('"log10":-', '"log10":-1', 1),
+        lambda line: line[:-2] + ',"seconds":{"run":77.0}}' if line.endswith("},") else line,
+    ],
+)
+def test_rows_that_differ_in_their_seconds_alone_are_compared_as_those_that_are_read_whole(
+    tmp_path: Path, edit: Callable[[str], str]
+) -> None:
+    start, candidate = tmp_path / "start", tmp_path / "candidate"
+    whole = store.read(RESULTS / "peers")
+    timed = [row for row in whole.rows if row.outcome == "success" and "least" in row.seconds][:4]
+    start.mkdir()
+    store.write(replace(whole, rows=timed), start)
+    lines = (start / store.FILE).read_text("utf-8").split("\n")
+    candidate.mkdir()
+    (candidate / store.FILE).write_text("\n".join([lines[0], *map(edit, lines[1:-2]), *lines[-2:]]), "utf-8")
+    in_pieces, at_once = _compared_both_ways(start, candidate)
+    assert in_pieces == at_once

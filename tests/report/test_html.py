@@ -532,3 +532,14 @@ def test_names_beside_curves_are_apart_and_on_the_axes(heights: list[float]) -> 
     assert placed[0] >= 0
     assert placed[-1] <= 10
     assert apart([1.0, 3.0], 1.0, 0.0, 10.0) == [1.0, 3.0]
+
+
+@pytest.mark.slow
+def test_a_chart_of_drift_names_the_integral_and_says_how_many_samples_it_shows() -> None:
+    whole = store.read(RESULTS)
+    rows = [drift for drift in whole.rows if drift.key.kind == "drift" and drift.outcome == "success"][:1]
+    (errors,) = (part for part in html.sections([("", replace(whole, rows=rows))]) if part.id == "growth")
+    assert errors.pictures[0].title.startswith(f"{rows[0].case}: drift of ")
+    assert errors.pictures[0].title.rpartition("drift of ")[2] in {"energy", "M·γ", "|γ|²", "|M|²", "Ω3", "Ω1", "Ω2"}
+    kept = len(next(iter(rows[0].series.values())).times)
+    assert f"Curves show {kept} of {rows[0].samples} samples; the largest errors are those of all." in errors.notes

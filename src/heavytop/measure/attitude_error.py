@@ -89,8 +89,8 @@ class Convention:
         }
         for name, values in known.items():
             if getattr(self, name) not in values:
-                said = ", ".join(value for value in values if value)
-                raise InputError(f"{name} = {quoted(getattr(self, name))} is not known.", f"Use one of {said}.")
+                allowed = ", ".join(value for value in values if value)
+                raise InputError(f"{name} = {quoted(getattr(self, name))} is not known.", f"Use one of {allowed}.")
 
     def rotation(self, form: str, values: Sequence[Any], lib: Any) -> list[list[Any]]:
         """R of the columns of ``form``, body to space of the file; of a quaternion of any length that of its direction.

@@ -48,7 +48,7 @@ _KEPT = 5.0
 _LOOKS = 12
 """Calls from further away, of which every one must be slow."""
 _ENOUGH_AS_QUICK = 3
-"""Of them so many that are as quick as an equal call made then: on a busy machine both wait for the processor."""
+"""So many of them are as quick as an equal call made then: on a busy machine both wait for the processor."""
 _AFAR = 512
 """A start is far from those of the other calls that is off by this part of itself."""
 _KEPT_SECONDS = 1e-3
@@ -392,8 +392,8 @@ def _errors(
     """The error of Ω and γ, of its parts, and of attitude and position where every motion has them."""
     omega = numpy.linalg.norm([[float(w) for w in start.omega] for start in starts], axis=1)
     one = numpy.ones(len(starts))
-    whole = numpy.hypot(omega, one)
-    sizes = {"along": whole, "across": whole, "omega": omega, "gamma": one}
+    state_sizes = numpy.hypot(omega, one)
+    sizes = {"along": state_sizes, "across": state_sizes, "omega": omega, "gamma": one}
     blur, errors = numpy.array(reference.blur), {}
     for part, accumulates in _ACCUMULATES.items():
         quantity = Quantity(SOLUTION_ERROR, part)

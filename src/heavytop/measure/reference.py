@@ -129,17 +129,17 @@ class KnownMotion:
     def _value(self, index: int, output: Output, narrow: float) -> list[arb | None]:
         asked, extra = bits_of(self.digits), GUARD_BITS
         most = 2 * asked + 2 * GUARD_BITS if output.name == "euler" else math.inf
-        whole = self.at(index)
+        state = self.at(index)
         for _ in range(_ATTEMPTS):
-            values = self._evaluated(whole, asked + extra, output)
+            values = self._evaluated(state, asked + extra, output)
             lacking = max(self._lacking(value, output, narrow) for value in values)
             if lacking <= 0:
                 return list(values)
-            if extra >= most or (output.name == "euler" and self._locked(whole, output)):
+            if extra >= most or (output.name == "euler" and self._locked(state, output)):
                 break
             extra += int(lacking) + GUARD_BITS if lacking < math.inf else asked + GUARD_BITS
             try:
-                whole = self.at(index, extra)
+                state = self.at(index, extra)
             except OutOfReach:
                 if output.name != "euler":
                     raise

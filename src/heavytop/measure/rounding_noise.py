@@ -108,7 +108,7 @@ def _spread(values: Sequence[float]) -> float:
 _STEPS = 20_000
 """A longer run is rerun over about its first so many steps only."""
 _STEPS_SINGLY = 2000
-"""The same for an integrator that takes one motion at a time."""
+"""Steps of a rerun by an integrator that takes one motion at a time."""
 _SAMPLES, _SAMPLES_OF_CHAOS = 32, 64
 """The second without a closed form: of a chaotic motion the last samples with a digit left decide the largest error."""
 _FACTOR_BITS = 32

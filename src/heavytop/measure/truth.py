@@ -45,7 +45,7 @@ MORE_BITS = 30
 EFFORT = 60.0
 """Seconds of the model of the cost that each run may take; absurd starts and times would never end."""
 EFFORT_OF_MANY = 600.0
-"""The same for all the runs of an ensemble together."""
+"""Seconds for all the runs of an ensemble together."""
 _PILOT_STEPS = 1000
 """A run that takes more is forecast from so many: what would take longer than its effort is refused at once."""
 _SEARCH = 8
@@ -442,14 +442,14 @@ def _nine(solution: ExactSolution, problem: Problem, horizon: Fraction) -> Evalu
     assert xi is not None
     start: Vector = (xi[0], xi[1], xi[2])
     if isinstance(solution, Validated):
-        whole: Evaluate = Validated(solution.top, solution.start, solution.system, xi=start).with_attitude
+        evaluate: Evaluate = Validated(solution.top, solution.start, solution.system, xi=start).with_attitude
     else:
-        whole = starting_at(start, solution.start.gamma, state_and_attitude(solution, horizon, bits)[1])
+        evaluate = starting_at(start, solution.start.gamma, state_and_attitude(solution, horizon, bits)[1])
     try:
-        whole(horizon, bits)
+        evaluate(horizon, bits)
     except (NotInClass, OutOfReach):
         return None
-    return whole
+    return evaluate
 
 
 # What the motions of an ensemble are compared with: closed forms, else runs in more bits.

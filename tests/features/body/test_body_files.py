@@ -339,7 +339,7 @@ def test_the_command_line_takes_a_body_from_a_file(tmp_path: Path) -> None:
         heavytop("reference", "--file", path, "--gravity", "0", *start, "--digits", "20", "--json").stdout
     )
     assert known["method"].startswith("validated")
-    for extra, words in ((("--mass", "1"), "file and mass were given"), (("--link", "leg"), "has no link 'leg'")):
+    for extra, words in ((("--mass", "1"), "--file and --mass were given"), (("--link", "leg"), "has no link 'leg'")):
         done = heavytop("propagate", "--file", path, *extra, *start)
         assert done.returncode == 2
         assert words in done.stderr

@@ -153,8 +153,8 @@ def _data(motions: Drawn) -> dict[str, object]:
 
 
 def _headline(rows: Sequence[Row]) -> Iterator[Headline]:
-    """The median and the worst error, of the survey with the worst: ``2,000 tops: median error 7e-16, worst 1.2e-14
-    (top 1489).``
+    """The median and the worst error, of the survey with the worst: ``2,000 tops: median error 7e-16, worst 1.2e-14,
+    body many[1489].``
     """
     errors = [(metric, row) for row in rows if (metric := row.metric("solution_error", "relative", "max"))]
     if not errors:
@@ -164,7 +164,7 @@ def _headline(rows: Sequence[Row]) -> Iterator[Headline]:
     sentence = f"{count:,} tops{f' of {row.case}' if len(rows) > 1 else ''}: "
     if (median := row.metric("solution_error", "relative", "median")) is not None:
         sentence += f"median error {short(median.value, 2)}, "
-    which = f" (top {row.worst[0].index})" if isinstance(row.worst, tuple) and row.worst else ""
+    which = f", body {row.worst[0].case}" if isinstance(row.worst, tuple) and row.worst else ""
     yield Headline(f"{sentence}worst {short(worst.value, 2)}{which}.")
 
 

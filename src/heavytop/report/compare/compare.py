@@ -58,12 +58,12 @@ class Differences:
     @property
     def verdict(self) -> str:
         """worse if anything is; else incomparable if anything is missing or incomparable; else better or same."""
-        seen = self.tally
-        if Verdict.WORSE in seen:
+        tally = self.tally
+        if Verdict.WORSE in tally:
             return "worse"
-        if Verdict.MISSING in seen or Verdict.INCOMPARABLE in seen:
+        if Verdict.MISSING in tally or Verdict.INCOMPARABLE in tally:
             return "incomparable"
-        return "better" if Verdict.BETTER in seen else "same"
+        return "better" if Verdict.BETTER in tally else "same"
 
     @property
     def exit_code(self) -> ExitCode:

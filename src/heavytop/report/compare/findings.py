@@ -37,7 +37,7 @@ _ENDS_AS_BEFORE = 0.5
 _STEPS_MOVED = 0.02
 """Decades: a step size control that rounds otherwise moves the steps by less."""
 _LESS = 0.5
-"""Of the decades that the finest setting lost, what a coarser one may have lost where an error of lower order came."""
+"""Part of the decades lost by the finest setting that a coarser one may lose where an error of lower order came."""
 _LOWER_ORDER = (
     "; coarser settings {}: the new error is of lower order than the method's, as of a coefficient or a "
     "stage in lower precision"
@@ -433,12 +433,12 @@ def _explained(changes: Changes) -> Iterator[Sentence]:
         cases = max(kinds.values(), key=len)
         (text, first), also = cases[0], len(cases) - 1
         more = f" and {plural(also, 'other row')}" if also else ""
-        seen = f" Seen on {_where(first)}{more}."
-        room = _LONGEST - len(seen)
+        where_seen = f" Seen on {_where(first)}{more}."
+        room = _LONGEST - len(where_seen)
         while len(text) > room and ". " in text:
             text = text[: text.rindex(". ") + 1]
         text = text if len(text) <= room else clip(text, room - _CLIPPED)
-        yield Sentence(text + seen, frozenset(row for _, row in cases))
+        yield Sentence(text + where_seen, frozenset(row for _, row in cases))
 
 
 def _whole_rows(rows: Sequence[Change], *verdicts: Verdict) -> Iterator[Sentence]:

@@ -39,7 +39,7 @@ BITS = math.log10(2)
 _LOSS = 2 * BITS
 """By how much an error may grow where the policy does not say."""
 _TENTH = math.log10(1.1)
-"""The same of an error that is truncation, which every machine makes the same."""
+"""Growth that is allowed of an error of truncation, which every machine makes the same."""
 _REMEDY = "`heavytop docs compare` shows every key of a policy."
 
 
@@ -328,7 +328,7 @@ _BY_CHANCE = 1.4
 _LEAST = 0.05
 """Decades.  A band below this excuses nothing that the allowed loss does not; its own scatter is of no interest."""
 _LEAST_LOST = 0.3
-"""The same where the motion loses all digits before the end: its errors are as large as it is, and a rerun that comes
+"""Decades, where the motion loses all digits before the end: its errors are as large as it is, and a rerun that comes
 near the motion again by chance makes the band."""
 STEP_CONTROL = 1.2
 """Decades.  A rounding may turn a step of a method with step control into another one, which moves its truncation error

@@ -83,7 +83,7 @@ _SPAN = 2.0
 _DETECTS = math.log10(8)
 """Decades.  The smallest detectable fault of a rerun is larger by a factor of 6.6 at most, in the same pairs."""
 _BY_CHANCE = 1.4
-"""Of a rerun the interval counts as no wider than that of the baseline by this factor, as its noise bands do."""
+"""Factor by which the interval of a rerun may be wider than that of the baseline by chance, as its noise bands may."""
 _APART = 0.1
 """Exponents of two reruns are apart by that part of the width of the baseline's interval: of the dozens of laws in a
 report some intervals just do not meet.  Figures: docs/compare.md."""
@@ -238,7 +238,7 @@ def judge_series(old: Series, new: Series, allowed: float, floor: float, exactly
 
 
 _STEPS = 2
-"""The same method with the same setting takes as many steps, and evaluates the field as often: a factor beyond this is
+"""Factor: one method with one setting takes as many steps, and evaluates the field as often; beyond this it is
 another method."""
 _ANOTHER: Judged = (Verdict.INCOMPARABLE, "it says that it is another quantity")
 

@@ -216,7 +216,7 @@ def judge_seconds(old: float, new: float, timings: Timings) -> Judged:
 
 
 BAND = "band"
-"""Of seconds: half-width in decades of the interval that holds the middle 95 % of the runs."""
+"""Key of the band of seconds: half-width in decades of the interval that holds the middle 95 % of the runs."""
 _WIDEST = 0.25
 """Decades.  Runs that scatter by a factor of 3 say nothing of a machine's speed."""
 

@@ -12,7 +12,7 @@ import io
 import json
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any, NamedTuple
@@ -20,7 +20,7 @@ from xml.etree import ElementTree
 
 from heavytop.display import plural, printable
 from heavytop.errors import InputError, quoted
-from heavytop.measure.scalar import digits_kept
+from heavytop.measure.scalar import digits_right
 from heavytop.records import UNRESOLVED_SECONDS, UNSUPPORTED, Quantity, Report, Row
 from heavytop.report.compare.compare import Differences
 from heavytop.report.compare.findings import folded, line, statistics
@@ -71,8 +71,8 @@ def measures(row: Row) -> Iterator[Measure]:
     if row.outcome != "success":
         return
     eps = (1 - row.bits) * math.log10(2) if row.bits else None
-    if (kept := digits_kept(row)) is not None:
-        yield Measure("log10 of the error", -kept + 0.0, "decades")
+    if (right := digits_right(row)) is not None:
+        yield Measure("log10 of the error", round(0.0 - right, 6), "decades")
     elif (metric := row.metrics.get(_LARGEST)) is not None and metric.log10 is not None:
         yield Measure("log10 of the error", metric.log10, "decades")
     for name, metric in drifts(row):
@@ -167,9 +167,7 @@ def asv(report: Report, kinds: Kinds) -> str:
 def junit(report: Report, kinds: Kinds) -> str:
     """A test case a row: one that failed is an error, one that is not supported is skipped."""
     bad = sum(_is_lost(row, kinds) for row in report.rows)
-    skipped = sum(row.outcome == UNSUPPORTED for row in report.rows)
-    counts = {"tests": len(report.rows), "failures": 0, "errors": bad, "skipped": skipped, "time": 0}
-    suite = ElementTree.Element("testsuite", {"name": "heavytop"} | {key: str(count) for key, count in counts.items()})
+    suite = _suite("heavytop", len(report.rows), 0, bad, sum(row.outcome == UNSUPPORTED for row in report.rows))
     for row in report.rows:
         name = printable(row_name(row.identity, with_kind=False))
         seconds = f"{row.seconds.get('run', 0.0):.6f}"
@@ -178,10 +176,19 @@ def junit(report: Report, kinds: Kinds) -> str:
             ElementTree.SubElement(case, "skipped", message=printable(row.against))
         elif _is_lost(row, kinds):
             ElementTree.SubElement(case, "error", message=printable(row.against), type=row.outcome)
-        said = [kind_of(row, kinds).line(row)] if row.metrics else []
-        said += [f"{number.name}: {number.value:.6g} {number.unit}" for number in measures(row)]
-        if text := "\n".join(filter(None, said)):
+        output = [kind_of(row, kinds).line(row)] if row.metrics else []
+        output += [f"{number.name}: {number.value:.6g} {number.unit}" for number in measures(row)]
+        if text := "\n".join(filter(None, output)):
             ElementTree.SubElement(case, "system-out").text = printable(text)
+    return _xml(suite)
+
+
+def _suite(name: str, tests: int, failures: int, errors: int, skipped: int) -> ElementTree.Element:
+    counts = {"tests": tests, "failures": failures, "errors": errors, "skipped": skipped, "time": 0}
+    return ElementTree.Element("testsuite", {"name": name} | {key: str(count) for key, count in counts.items()})
+
+
+def _xml(suite: ElementTree.Element) -> str:
     ElementTree.indent(suite)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(suite, "unicode") + "\n"
 
@@ -208,16 +215,8 @@ _ERROR = {Verdict.MISSING, Verdict.INCOMPARABLE}
 
 def comparison_junit(result: Differences) -> str:
     """Worse is a failure; missing and incomparable are errors; everything else passes."""
-    count = result.tally
-    suite = ElementTree.Element(
-        "testsuite",
-        name="heavytop compare",
-        tests=str(len(result.findings)),
-        failures=str(sum(count.get(verdict, 0) for verdict in _FAILURE)),
-        errors=str(sum(count.get(verdict, 0) for verdict in _ERROR)),
-        skipped="0",
-        time="0",
-    )
+    failures, errors = (sum(result.tally.get(verdict, 0) for verdict in bad) for bad in (_FAILURE, _ERROR))
+    suite = _suite("heavytop compare", len(result.findings), failures, errors, 0)
     properties = ElementTree.SubElement(suite, "properties")
     for name, old, new in result.environment:
         ElementTree.SubElement(properties, "property", name=printable(name), value=printable(f"{old} -> {new}"))
@@ -231,8 +230,7 @@ def comparison_junit(result: Differences) -> str:
             ElementTree.SubElement(case, kind, message=printable(message), type=finding.verdict.value)
         elif finding.verdict is not Verdict.SAME:
             ElementTree.SubElement(case, "system-out").text = printable(message)
-    ElementTree.indent(suite)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(suite, "unicode") + "\n"
+    return _xml(suite)
 
 
 # A comparison for a pull request: GitHub-flavoured Markdown, short.
@@ -254,14 +252,8 @@ def comparison_markdown(result: Differences, page: Path | None = None) -> str:
     rows, metrics = (_rows(result), _metrics(result)) if result.rows else ([], [])
     end = []
     if result.environment:
-        end += [
-            "<details><summary>Inputs or environments differ</summary>",
-            "",
-            "| | baseline | candidate |",
-            "|---|---|---|",
-        ]
-        end += ["| " + " | ".join(map(escaped_cell, difference)) + " |" for difference in result.environment[:_MOST]]
-        end += ["", "</details>", ""]
+        changes = _table(("", "baseline", "candidate"), result.environment[:_MOST], words=3)
+        end += ["<details><summary>Inputs or environments differ</summary>", "", *changes, "", "</details>", ""]
     if page is not None:
         # no link: a comment does not lie beside the file
         end += [f"Both on the same axes: {escaped_cell(page.name)}.", ""]
@@ -271,26 +263,30 @@ def comparison_markdown(result: Differences, page: Path | None = None) -> str:
 
 def _rows(result: Differences) -> list[str]:
     cells = ((c.verdict.value, row_name(c.identity), line(c)) for c in result.rows[:_MOST])
-    lines = [
-        "| verdict | row | what changed |",
-        "|---|---|---|",
-        *("| " + " | ".join(map(escaped_cell, c)) + " |" for c in cells),
-    ]
-    return [*lines, *(["", f"and {len(result.rows) - _MOST} more."] if len(result.rows) > _MOST else []), ""]
+    more = ["", f"and {len(result.rows) - _MOST} more."] if len(result.rows) > _MOST else []
+    return [*_table(("verdict", "row", "what changed"), cells, words=3), *more, ""]
 
 
 def _metrics(result: Differences) -> list[str]:
     """Changes of each row, largest, rms and last value of one quantity in one line; folded."""
-    head = ["<details><summary>Every quantity that changed</summary>", ""]
-    head += ["| verdict | row | quantity | baseline | candidate | why |", "|---|---|---|---:|---:|---|"]
+    columns = ("verdict", "row", "quantity", "baseline", "candidate", "why")
     changes = ((change, *quantity) for change in result.rows[:_MOST] for quantity in folded(change))
     cells = (
         (c.verdict.value, row_name(c.identity), statistics(c, name, group), *values(group[0]), group[0].reason)
         for c, name, group in changes
     )
-    lines = ["| " + " | ".join(map(escaped_cell, row)) + " |" for row in cells]
-    more = ["", f"and {len(lines) - _MOST_METRICS} more."] if len(lines) > _MOST_METRICS else []
-    return [*head, *lines[:_MOST_METRICS], *more, "", "</details>", ""]
+    changed = list(cells)
+    more = ["", f"and {len(changed) - _MOST_METRICS} more."] if len(changed) > _MOST_METRICS else []
+    head = "<details><summary>Every quantity that changed</summary>"
+    return [head, "", *_table(columns, changed[:_MOST_METRICS], 3, left=True), *more, "", "</details>", ""]
+
+
+def _table(columns: Sequence[str], rows: Iterable[Iterable[str]], words: int, left: bool = False) -> list[str]:
+    """A table; its first ``words`` columns are words, the others are numbers; ``left``: not the last."""
+    last = len(columns) - 1
+    rule = ["---" if index < words or (left and index == last) else "---:" for index in range(len(columns))]
+    head, *lines = (list(map(escaped_cell, row)) for row in (columns, *rows))
+    return [f"| {' | '.join(cells)} |" for cells in (head, rule, *lines)]
 
 
 def escaped_cell(text: str) -> str:
@@ -310,8 +306,8 @@ def escaped(text: str) -> str:
 def to_json(report: Report, kinds: Kinds) -> dict[str, Any]:
     """The blocks of each kind, without charts: a cell is text, or an object that says what it is."""
     blocks = document(report, kinds, In.FULL)
-    said = [{"kind": name, "blocks": [_block(block) for block in blocks]} for name, blocks in blocks.items()]
-    return {"plan": report.plan, "measurements": len(report.rows), "kinds": said}
+    kinds_blocks = [{"kind": name, "blocks": [_block(block) for block in blocks]} for name, blocks in blocks.items()]
+    return {"plan": report.plan, "measurements": len(report.rows), "kinds": kinds_blocks}
 
 
 def _block(block: Block) -> dict[str, Any]:
@@ -336,9 +332,9 @@ def _block(block: Block) -> dict[str, Any]:
 def _cell(cell: Cell) -> Any:
     match cell:
         case Value():
-            known = cell.metric
-            said = None if known is None else (known.value, known.log10, known.band, known.kind)
-            return said and dict(zip(("value", "log10", "band", "kind"), said, strict=True))
+            metric = cell.metric
+            parts = None if metric is None else (metric.value, metric.log10, metric.band, metric.kind)
+            return parts and dict(zip(("value", "log10", "band", "kind"), parts, strict=True))
         case Word():
             return {"verdict": cell.text}
         case Quantity():
@@ -372,11 +368,5 @@ def _markdown(block: Block) -> Iterator[str]:
             if block.title:
                 yield from (f"#### {escaped(block.title)}", "")
             yield from (line for note in block.notes for line in (escaped(note), ""))
-            yield _row([escaped_cell(column) for column in block.columns])
-            yield _row(["---" if index < block.words else "---:" for index in range(len(block.columns))])
-            yield from (_row([escaped_cell(cell_text(cell)) for cell in row]) for row in block.rows)
+            yield from _table(block.columns, (map(cell_text, row) for row in block.rows), block.words)
             yield ""
-
-
-def _row(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cells) + " |"

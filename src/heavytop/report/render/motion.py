@@ -66,7 +66,7 @@ class MotionTable:
     values: tuple[tuple[tuple[str, str | None], ...], ...]
 
     def of_case(self, name: str | None) -> MotionTable:
-        """The same, whose facts say the case that the motion is; None for data that are none's."""
+        """This table with the case that the motion is among its facts; as it is where no case has these data."""
         return self if name is None else replace(self, facts=(*self.facts[:2], ("name", name), *self.facts[2:]))
 
     def csv(self) -> str:
@@ -251,8 +251,8 @@ def _caption(facts: dict[str, str]) -> str:
     """Caption that makes the table readable alone."""
     made = ("digits", "method") if "digits" in facts else ("precision", "integrator")
     known = [(key, _escaped(facts[key])) for key in ("name", *_DATA, *made) if key in facts]
-    said = "; ".join(f"{_escaped(_one_line(key))} " + text.replace("/", r"/\allowbreak ") for key, text in known)
-    return f"{said}. heavytop {_escaped(facts['version'])}."
+    named_facts = "; ".join(f"{_escaped(_one_line(key))} " + text.replace("/", r"/\allowbreak ") for key, text in known)
+    return f"{named_facts}. heavytop {_escaped(facts['version'])}."
 
 
 def _escaped(text: str) -> str:

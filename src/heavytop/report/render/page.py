@@ -186,8 +186,8 @@ def _badness(row: Row) -> tuple[bool, bool, float]:
 
 def main_metric(row: Row, kinds: Kinds) -> str:
     """Beginning of a line about a row: what its kind says, else an error if it has one that is a number."""
-    if row.metrics and (said := kind_of(row, kinds).line(row)):
-        return said
+    if row.metrics and (beginning := kind_of(row, kinds).line(row)):
+        return beginning
     errors = [name for name in (RELATIVE.text, ERRORS[0].text) if name in row.metrics]
     errors += [name for name, metric in row.metrics.items() if metric.kind == "error" and metric.log10 is not None]
     name = next(iter(errors or row.metrics), None)
@@ -305,21 +305,21 @@ def digits_headline(rows: Sequence[Row]) -> Headline | None:
     last = max(abs(exact(row.horizon)) for row, _ in chosen)
     longest = [pair for pair in chosen if abs(exact(pair[0].horizon)) == last]
     row, kept = min(longest, key=lambda pair: pair[1])
-    said = f"{clip(row.key.subject.name, 40)} in {clip(row.precision, 20)}: {at_least}{digits_text(kept)} of "
-    said += f"{digits_of(row.bits)} digits right to T = {short(row.horizon)} ({clip(row.case, 40)}"
+    sentence = f"{clip(row.key.subject.name, 40)} in {clip(row.precision, 20)}: {at_least}{digits_text(kept)} of "
+    sentence += f"{digits_of(row.bits)} digits right to T = {short(row.horizon)} ({clip(row.case, 40)}"
     cases = {row.case for row, _ in longest}
     lost = [
-        clip(each.case, 40)
-        for each in finished
-        if each.case not in cases
-        and (each.key.subject, each.precision) == (row.key.subject, row.precision)
-        and each.reference.until
-        and abs(exact(each.reference.until)) <= last
+        clip(other_row.case, 40)
+        for other_row in finished
+        if other_row.case not in cases
+        and (other_row.key.subject, other_row.precision) == (row.key.subject, row.precision)
+        and other_row.reference.until
+        and abs(exact(other_row.reference.until)) <= last
     ]
-    said += f", worst of {len(cases)})" if len(cases) > 1 and not lost else ")"
-    said += f", none on {', '.join(lost[:_LOST])}" if lost else ""
-    said += f"; {other}: {digits_text(second[_place(row)])}." if _place(row) in second else "."
-    return Headline(said, shown=In.SHORT | In.FULL | In.PAGE)
+    sentence += f", worst of {len(cases)})" if len(cases) > 1 and not lost else ")"
+    sentence += f", none on {', '.join(lost[:_LOST])}" if lost else ""
+    sentence += f"; {other}: {digits_text(second[_place(row)])}." if _place(row) in second else "."
+    return Headline(sentence, shown=In.SHORT | In.FULL | In.PAGE)
 
 
 def _at_least(row: Row) -> float | None:
@@ -480,12 +480,12 @@ def laws_headline(rows: Sequence[Row]) -> Headline | None:
     theirs = [row for row in rows if row.key.subject.name not in (HEYOKA, MULTIWORD)]
     healthy = theirs or [row for row in rows if not row.key.subject.variant] or rows
     parts = [_followed(healthy, drifts=False), _followed(healthy, drifts=True)]
-    said = ", ".join(part for part in parts if part)
+    sentence = ", ".join(part for part in parts if part)
     faults = [row for row in rows if row.key.subject.bias]
-    told = sum(_told(row, healthy) for row in faults)
-    if faults and said:
-        said += f"; {told} of {len(faults)} planted faults show another law"
-    return Headline(f"{said[0].upper()}{said[1:]}.") if said else None
+    distinguished = sum(_told(row, healthy) for row in faults)
+    if faults and sentence:
+        sentence += f"; {distinguished} of {len(faults)} planted faults show another law"
+    return Headline(f"{sentence[0].upper()}{sentence[1:]}.") if sentence else None
 
 
 def _followed(rows: Sequence[Row], drifts: bool) -> str:
@@ -506,7 +506,7 @@ def _followed(rows: Sequence[Row], drifts: bool) -> str:
 
 
 def _laws(row: Row, drifts: bool) -> list[Law]:
-    """Of the error along the flow, or of the first integrals; what is exactly 0 has none."""
+    """Laws of the error along the flow, or of the first integrals; what is exactly 0 has none."""
     laws = [(law, law.quantity) for law in row.laws.values() if law.exponent is not None or law.growth != "bounded"]
     if drifts:
         return [law for law, quantity in laws if quantity and quantity.name == DRIFT]

@@ -24,6 +24,7 @@ from heavytop.report.document.document import (
     Sources,
     clip,
     draw,
+    integral_text,
     left_out,
     logarithm,
     points,
@@ -71,19 +72,28 @@ class _Column(NamedTuple):
 
 
 _COLUMNS = (
-    _Column(Quantity(DRIFT), "drift of a first integral", "|I(t) − I(0)| (units of ε)"),
+    _Column(Quantity(DRIFT), "drift of", "|I(t) − I(0)| (units of ε)"),
     _Column(Quantity(SOLUTION_ERROR, "along"), "error along the flow", "error along (units of ε)"),
     _Column(Quantity(SOLUTION_ERROR, "across"), "error across the flow", "error across (units of ε)"),
 )
 
 
 class _Chart(NamedTuple):
-    """Axes of one case and quantity, with what they show in words, and where each law stands."""
+    """Axes of one case and quantity, with what they show in words, and where each law stands.
+
+    integrals: the first integrals whose drift is drawn.
+    """
 
     axes: Any
-    title: str
+    label: str
     alternative: list[str]
     ends: list[End]
+    integrals: dict[str, None]
+
+    @property
+    def title(self) -> str:
+        """The case and the quantity, of drifts with the first integrals by name."""
+        return f"{self.label} {' or '.join(map(integral_text, self.integrals))}".rstrip()
 
 
 def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
@@ -117,11 +127,12 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         drawn = [_chart(section, name, column, cases[name]) for column in _COLUMNS]
         charts = [chart for chart in drawn if chart]
         x, y = ([getattr(chart.axes, f"get_{axis}lim")() for chart in charts] for axis in "xy")
-        for axes, title, alternative, ends in charts:
-            axes.set_xlim(min(low for low, _ in x), max(high for _, high in x))
-            axes.set_ylim(min(low for low, _ in y), max(high for _, high in y))
-            name = f"growth-{len(section.pictures)}"
-            section.pictures.append(finish(axes, title, spoken(alternative, 24), name, ends=ends))
+        for chart in charts:
+            chart.axes.set_xlim(min(low for low, _ in x), max(high for _, high in x))
+            chart.axes.set_ylim(min(low for low, _ in y), max(high for _, high in y))
+            words, number = spoken(chart.alternative, 24), f"growth-{len(section.pictures)}"
+            section.pictures.append(finish(chart.axes, chart.title, words, number, ends=chart.ends))
+    section.notes += _thinned(row for case in names[:MOST_PLOTS] for _, row in cases[case])
     if _FITTED.label in section.legend:
         section.legend[_FITTED.label] = section.legend.pop(_FITTED.label)
         section.notes.append(
@@ -137,7 +148,7 @@ def _chart(section: Section, case: str, column: _Column, members: Sequence[tuple
     axes = new_axes(TIME, column.unit, right=room(laws) if laws else 0.12)
     decades(axes.xaxis)
     decades(axes.yaxis)
-    chart = _Chart(axes, f"{clip(case, 40)}: {column.label}", [], [])
+    chart = _Chart(axes, f"{clip(case, 40)}: {column.label}", [], [], {})
     lacking = []
     for key, row in members:
         largest = _largest(column, [other for _, other in members if other.key == row.key])
@@ -159,6 +170,8 @@ def _curve(section: Section, chart: _Chart, case: str, key: Key, row: Row, quant
         chart.alternative.append(f"{key.label}: nothing that the reference resolves, or exactly 0.")
         return
     draw(chart.axes, section.key(key), x, y)
+    if quantity.name == DRIFT:
+        chart.integrals[quantity.component] = None
     colour = COLOURS[key.colour]
     law, band = row.laws.get(quantity.text), _band(row.metrics, quantity)
     if band:
@@ -175,6 +188,21 @@ def _curve(section: Section, chart: _Chart, case: str, key: Key, row: Row, quant
     most = row.metrics.get(quantity.over("max").text)
     last = [short(held.times[-1]), short(held.values[-1])]
     section.rows.append([case, key.label, named, short(most.value) if most else "", *last, *_law_words(law)])
+
+
+def _thinned(rows: Iterable[Row]) -> list[str]:
+    """A sentence where curves have fewer samples than their runs; none where they have all."""
+    counts = {(len(series.times), row.samples) for row in rows for series in row.series.values() if series.times}
+    fewer = [pair for pair in counts if pair[0] < pair[1]]
+    if not fewer:
+        return []
+    drawn, taken = (_span(sorted(part)) for part in zip(*fewer, strict=True))
+    return [f"Curves show {drawn} of {taken} samples; the largest errors are those of all."]
+
+
+def _span(counts: Sequence[int]) -> str:
+    """``13``, or ``13 to 20`` of different counts."""
+    return str(counts[0]) if counts[0] == counts[-1] else f"{counts[0]} to {counts[-1]}"
 
 
 def _largest(column: _Column, rows: Sequence[Row]) -> Quantity | None:
@@ -313,8 +341,8 @@ def _digits_right(section: Section, precision: str, lanes: dict[str, list[_Run]]
         ends.append(End(texts[lane], COLOURS[0], kept or 0.0, -index))
     axes.set(xlim=(-0.02 * most, 1.02 * most), ylim=(0.7 - len(lanes), 0.7), yticks=[])
     axes.axvline(most, color=COLOURS[_GREY], lw=0.9, ls=DASHED)
-    said = spoken([f"{text}." for text in texts.values()], 24)
-    return finish(axes, f"Digits right in {precision}", said, name, ends=ends)
+    words = spoken([f"{text}." for text in texts.values()], 24)
+    return finish(axes, f"Digits right in {precision}", words, name, ends=ends)
 
 
 def _kept(row: Row) -> float | None:

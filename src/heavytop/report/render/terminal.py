@@ -6,20 +6,19 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from io import StringIO
 from itertools import chain, islice
-from math import inf
 
 from msgspec.structs import replace
 from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.text import Text
 
 from heavytop.display import plural, printable
-from heavytop.measure.scalar import digits_kept, digits_text
+from heavytop.measure.scalar import digits_text
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR
 from heavytop.records import HEYOKA, MULTIWORD, UNMEASURED, UNSUPPORTED, Quantity, Report, Row, Series
 from heavytop.report.compare.verdicts import size
 from heavytop.report.document.document import Block, Card, Chart, Headline, In, Note, Table, Word, points, short
 from heavytop.report.document.kind import Kinds, document, headlines
-from heavytop.report.render.text import WORD_STYLES, Lines, failed, failure, head, title, unsupported, wrapped
+from heavytop.report.render.text import WORD_STYLES, Lines, Tally, failed, failure, head, title, unsupported, wrapped
 
 WIDTH = 80
 LINES = 21
@@ -44,11 +43,11 @@ def summary(report: Report, kinds: Kinds) -> RenderableType:
     for blocks in blocks_by_kind.values():
         parts += [Text(), *_shown([block for block in blocks if not isinstance(block, Headline)])]
     others = Counter(row.key.kind for row in report.rows if row.outcome not in UNMEASURED and row.key.kind not in kinds)
-    said = [
+    unlisted = [
         f"Measure {name or 'without a name'}: {count} rows, which the page lists (--html FILE)"
         for name, count in others.items()
     ]
-    for sentence in filter(None, [*said, unsupported(report.rows)]):
+    for sentence in filter(None, [*unlisted, unsupported(report.rows)]):
         parts += [Text(), Text(printable(sentence))]
     if failures := [row for row in report.rows if failed(row, kinds)]:
         parts += [Text(), Text("Failed measurements", style="bold red")]
@@ -64,14 +63,14 @@ class _Sentence:
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         word = "" if self._word is None else self._word.text
-        whole = printable(f"{word}: {self._text}" if word else self._text)
-        lines = wrapped(whole, self._indent + "  ", self._indent, options.max_width)
+        sentence = printable(f"{word}: {self._text}" if word else self._text)
+        lines = wrapped(sentence, self._indent + "  ", self._indent, options.max_width)
         for number, line in enumerate(lines):
-            said = Text(line, style=_STYLES.get(self._style, ""))
+            shown_line = Text(line, style=_STYLES.get(self._style, ""))
             if word and not number:
                 begin = len(self._indent)
-                said.stylize(WORD_STYLES.get(word, "bold yellow"), begin, begin + len(word))
-            yield said
+                shown_line.stylize(WORD_STYLES.get(word, "bold yellow"), begin, begin + len(word))
+            yield shown_line
 
 
 def _shown(blocks: Iterable[Block], brief: bool = False) -> Iterator[RenderableType]:
@@ -129,7 +128,7 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
         answers += headlines(blocks, kinds)
         others = ([block for block in blocks if block not in answers] for blocks in blocks.values())
         parts = [_lines(_shown(blocks, brief=True)) for blocks in (answers, *others)]
-        parts += [wrapped(said)[:_MOST_OF_ONE] for said in [unsupported(held)] if said]
+        parts += [wrapped(sentence)[:_MOST_OF_ONE] for sentence in [unsupported(held)] if sentence]
     else:
         parts = [_counted(seen(chain(first, stream)))]
     head = f"Plan {report.plan.get('name', '?')}: {plural(number, 'measurement')}, "
@@ -166,18 +165,14 @@ def _without_middle(part: Sequence[str], size: int) -> list[str]:
 
 def _counted(rows: Iterable[Row]) -> list[str]:
     """How rows of each kind and format ended, and the fewest digits."""
-    counts: dict[tuple[str, str], Counter[str]] = {}
-    fewest: dict[tuple[str, str], tuple[float, str]] = {}
+    tally = Tally()
     for row in rows:
-        group = row.key.kind, row.precision
-        counts.setdefault(group, Counter())[row.outcome] += 1
-        if (kept := digits_kept(row)) is not None:
-            fewest[group] = min(fewest.get(group, (inf, "")), (kept, row.case))
+        tally.take(row)
     lines = []
-    for group, outcomes in counts.items():
-        line = f"{' in '.join(group)}: " + ", ".join(f"{n} {outcome}" for outcome, n in sorted(outcomes.items()))
-        if group in fewest:
-            kept, case = fewest[group]
+    for group in tally.ended:
+        line = tally.outcomes(group)
+        if group in tally.fewest:
+            kept, case = tally.fewest[group]
             line += f"; fewest digits right {digits_text(kept)} ({case})"
         lines += wrapped(line)
     return lines
@@ -220,12 +215,12 @@ def laws_in_short(rows: Sequence[Row]) -> list[Block]:
     for (name, variant, case, growths), precisions in formats.items():
         runs = " ".join(part for part in (name, ", ".join(precisions), variant) if part)
         cases.setdefault((runs, *growths), []).append(case)
-    cells = [[f"{runs}: {', '.join(motions)}", *said] for (runs, *said), motions in cases.items()]
+    cells = [[f"{runs}: {', '.join(motions)}", *meanings] for (runs, *meanings), motions in cases.items()]
     blocks: list[Block] = [Table("Grows like", _COLUMNS, cells, words=len(_COLUMNS), shown=In.SHORT)]
     others = [row for row in rows if row.key.subject.name not in _OWN]
     ours = {(row.key.case, row.precision): row for row in rows if row.key.subject.name == HEYOKA}
-    said = (_meaning(row) + _larger(row, ours.get((row.key.case, row.precision), row)) for row in others)
-    return [*blocks, *(Note(sentence, shown=In.SHORT) for sentence in said)]
+    meanings = (_meaning(row) + _larger(row, ours.get((row.key.case, row.precision), row)) for row in others)
+    return [*blocks, *(Note(sentence, shown=In.SHORT) for sentence in meanings)]
 
 
 def _united(row: Row) -> tuple[str, ...]:

@@ -151,8 +151,10 @@ def _blocks(columns: Sequence[str], rows: Iterable[Sequence[Text]], width: int) 
     for first, *rest in rows:
         yield first
         pairs = zip(columns[1:], rest, strict=True)
-        said = ";  ".join(f"{column} {_glued(cell.plain)}".strip() for column, cell in pairs if cell.plain.strip())
-        yield from (Text(line.replace("\u00a0", " ")) for line in wrapped(said, "    ", "    ", width - 4))
+        named_cells = ";  ".join(
+            f"{column} {_glued(cell.plain)}".strip() for column, cell in pairs if cell.plain.strip()
+        )
+        yield from (Text(line.replace("\u00a0", " ")) for line in wrapped(named_cells, "    ", "    ", width - 4))
 
 
 def wrapped(text: str, indent: str = "  ", first: str = "", width: int = 80) -> list[str]:
@@ -189,6 +191,27 @@ def drifts(row: Row) -> list[tuple[str, Metric]]:
 # The summary of a report with more rows than anybody reads.
 
 
+class Tally:
+    """How rows ended, and the fewest digits right with their case, by measure and format."""
+
+    def __init__(self) -> None:
+        self.ended: dict[tuple[str, str], Counter[str]] = {}
+        self.fewest: dict[tuple[str, str], tuple[float, str]] = {}
+
+    def take(self, row: Row) -> tuple[str, str]:
+        """Count a row; returns its measure and format."""
+        group = row.key.kind, row.precision
+        self.ended.setdefault(group, Counter())[row.outcome] += 1
+        if (kept := digits_kept(row)) is not None:
+            self.fewest[group] = min(self.fewest.get(group, (inf, "")), (kept, row.case))
+        return group
+
+    def outcomes(self, group: tuple[str, str]) -> str:
+        """``drift in double: 3 failed, 5 success``."""
+        counts = ", ".join(f"{number} {outcome}" for outcome, number in sorted(self.ended[group].items()))
+        return f"{' in '.join(filter(None, group))}: {counts}"
+
+
 MOST_LISTED = 5000
 """More rows than these nobody reads: `show` sums them up too."""
 
@@ -197,16 +220,12 @@ def worst(report: AnyReport, rows: Iterable[Row], hint: str) -> RenderableType:
     """The largest error of each metric with its rounding noise, the fewest digits right, and how many rows ended how,
     by measure and format; then the hint.
     """
-    counts: dict[tuple[str, str], Counter[str]] = {}
+    tally = Tally()
     largest: dict[tuple[str, str], dict[str, tuple[float, Metric, str]]] = {}
-    fewest: dict[tuple[str, str], tuple[float, str]] = {}
     words: dict[tuple[str, str, str], Counter[str]] = {}
     for row in rows:
-        group = row.key.kind, row.precision
-        counts.setdefault(group, Counter())[row.outcome] += 1
+        group = tally.take(row)
         metrics = largest.setdefault(group, {})
-        if (kept := digits_kept(row)) is not None:
-            fewest[group] = min(fewest.get(group, (inf, "")), (kept, row.case))
         for name, metric in row.metrics.items():
             if metric.kind != "error":
                 continue
@@ -215,13 +234,9 @@ def worst(report: AnyReport, rows: Iterable[Row], hint: str) -> RenderableType:
             size = inf if metric.value == "nan" else -inf if metric.log10 is None else metric.log10
             if name not in metrics or size > metrics[name][0]:
                 metrics[name] = size, metric, row.case
-    parts: list[RenderableType] = [head(report, sum(count.total() for count in counts.values()))]
+    parts: list[RenderableType] = [head(report, sum(counts.total() for counts in tally.ended.values()))]
     for group, metrics in largest.items():
-        outcomes = ", ".join(f"{number} {outcome}" for outcome, number in sorted(counts[group].items()))
-        parts += [
-            Text(),
-            title(f"{' in '.join(filter(None, group))}: {outcomes}; the largest errors over their samples"),
-        ]
+        parts += [Text(), title(f"{tally.outcomes(group)}; the largest errors over their samples")]
         lines: list[list[Cell]] = [
             [
                 name,
@@ -231,8 +246,9 @@ def worst(report: AnyReport, rows: Iterable[Row], hint: str) -> RenderableType:
             ]
             for name, (_, metric, case) in metrics.items()
         ]
-        if group in fewest:
-            lines.append(["digits right, fewest", digits_text(fewest[group][0]), fewest[group][1], ""])
+        if group in tally.fewest:
+            kept, case = tally.fewest[group]
+            lines.append(["digits right, fewest", digits_text(kept), case, ""])
         parts.append(table(["metric", "largest", "in", "not available"], lines))
     return Group(*parts, Text(), Text(hint))
 

@@ -287,11 +287,11 @@ REMEDY = "Make it again with `heavytop run`, or of a trajectory with `heavytop s
 
 def check_keys(file: Path | str, rows: Iterable[Row]) -> None:
     """Raises InputError where a row is there twice."""
-    seen = set()
+    identities = set()
     for row in rows:
-        if row.identity in seen:
+        if row.identity in identities:
             raise InputError(f"{file} holds the row {printable(row_name(row.identity))[:60]} twice.", REMEDY)
-        seen.add(row.identity)
+        identities.add(row.identity)
 
 
 def check_rows(file: Path, rows: Sequence[Row], kinds: Kinds) -> None:
@@ -314,7 +314,7 @@ def _refuse_first(file: Path, row: Row, problems: Iterable[str]) -> None:
 
 
 def _problems(row: Row, kind: ReportedKind, doubtful: set[int]) -> Iterator[str]:
-    """What of a row cannot be, as ``FIELD: REASON``; only the first counts, as later ones may follow from it.
+    """Faults of a row, as ``FIELD: REASON``; only the first counts, as later ones may follow from it.
 
     doubtful: ids of the metrics that are looked at one by one.
     """
