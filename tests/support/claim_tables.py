@@ -22,7 +22,7 @@ def rotation(rate: str, assume: Sequence[str] = (), **parts: Any) -> Audit:
 
 
 def energy(x: str, divisor: str = "1", **parts: Any) -> Audit:
-    """The audit of the energy of Euler's top over a divisor, plus (x − 1) Ω1: true where x is 1, the divisor constant."""
+    """The audit of the energy of the top of Euler over a divisor, plus (x − 1) Ω1: true where x is 1."""
     table = {
         "name": "energy",
         "kind": "integral",
