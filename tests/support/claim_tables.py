@@ -10,7 +10,7 @@ from heavytop.features.claims.audit.judge import Audit
 
 
 def rotation(rate: str, assume: Sequence[str] = (), **parts: Any) -> Audit:
-    """Of a top that turns about the vertical at this rate: true where it is constant."""
+    """The audit of a top that turns about the vertical at this rate: true where it is constant."""
     table = {
         "name": "rotation",
         "kind": "motion",
@@ -22,7 +22,7 @@ def rotation(rate: str, assume: Sequence[str] = (), **parts: Any) -> Audit:
 
 
 def energy(x: str, divisor: str = "1", **parts: Any) -> Audit:
-    """Of the energy of Euler's top over a divisor, plus (x − 1) Ω1: true where x is 1 and the divisor constant."""
+    """The audit of the energy of the top of Euler over a divisor, plus (x − 1) Ω1: true where x is 1."""
     table = {
         "name": "energy",
         "kind": "integral",

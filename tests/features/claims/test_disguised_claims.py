@@ -270,7 +270,7 @@ def test_a_relation_of_hess_needs_no_sign_of_its_centre():
 @pytest.mark.slow
 @pytest.mark.parametrize(("divisor", "holds"), [("a - b", True), ("a - 2*b", False), ("2 - a", False)])
 def test_a_constant_of_parameters_is_no_gap_that_can_be_removed(divisor, holds):
-    """What is 0 at some parameters is 0 there all along every motion."""
+    """A constant that is 0 at some parameters is 0 there all along every motion."""
     energy = "(3*Omega1^2 + 2*Omega2^2 + Omega3^2)"
     given = {"parameters": {"a": "5", "b": "4"}, "assume": ["a > b", "b > 0"]}
     table = {
@@ -379,7 +379,7 @@ def test_an_exponential_below_1_is_no_lower_bound_above_1():
     ],
 )
 def test_halves_that_a_divisor_parts_have_sums_of_arcs_of_their_own(value, expected):
-    """Of the top of Lagrange that spins either way; the states of the file spin one way."""
+    """Integrals of the top of Lagrange that spins either way; the states of the file spin one way."""
     states = [["1", "2", spin, "3/5", "0", "4/5"] for spin in ("2", "3/7", "5")]
     table = {"kind": "integral", "name": "x", "integral": {"value": value, "states": states}}
     table["top"] = {"inertia": ["2", "2", "1"], "weight": "1", "centre": ["0", "0", "1"]}

@@ -21,7 +21,7 @@ LETTERS = {"Ω": "Omega", "γ": "gamma", "λ": "lambda", "ψ": "psi"}
 
 
 def value(node: ElementTree.Element) -> float:
-    """What a reader makes of the MathML: by the shapes alone, the program's own parser is not asked."""
+    """The formula that a reader makes of the MathML: by the shapes alone, the program's own parser is not asked."""
     if node.tag == "mfrac":
         return value(node[0]) / value(node[1])
     if node.tag == "msup":

@@ -1,4 +1,4 @@
-"""What is ≥ 0 is not taken for what is > 0, and a relation is solved only where the solution is the whole of it."""
+"""A fact ≥ 0 is not taken for one > 0, and a relation is solved only where the solution is the whole of it."""
 
 from __future__ import annotations
 

@@ -8,7 +8,8 @@ import pytest
 
 from heavytop.cases import CASES
 from heavytop.features.score.diagnose.diagnosis import diagnose
-from heavytop.features.score.diagnose.samples import Diagnosis, motion
+from heavytop.features.score.diagnose.samples import motion
+from heavytop.features.score.diagnose.search import Diagnosis
 from heavytop.features.score.text import diagnosis_text, sentence
 from heavytop.measure.scalar import roundings
 from heavytop.precision import DOUBLE, QUAD
@@ -336,6 +337,20 @@ def test_rounded_states_are_told_where_rounding_is_the_error(digits: int, kind: 
         assert found(top, start, times, spoilt, 100 * error) == []
     rows = [tuple(Fraction(v) for v in row) for row in y]
     assert roundings(rows, DOUBLE) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("power", [-60, 100])
+def test_columns_in_each_other_s_place_are_found_in_any_unit_of_time(power: int) -> None:
+    top, start, times = problem(10)
+    y = motion(top, start, HEAVY_TOP, times)
+    assert y is not None
+    size = Fraction(10) ** power
+    slow = HeavyTop(top.inertia, top.weight / size**2, top.centre)
+    begin = State([w / size for w in start.omega], start.gamma)
+    swapped = np.hstack([y[:, 3:6], y[:, :3] / float(size)])
+    (told,) = found(slow, begin, [time * size for time in times], swapped)
+    assert (told.kind, told.numbers) == ("columns_swapped", {})
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from heavytop.errors import ExitCode
-from heavytop.features.score.diagnose.samples import Diagnosis
+from heavytop.features.score.diagnose.search import Diagnosis
 from heavytop.features.score.several import ScoredFile, exit_code, orders, text
 from heavytop.features.score.text import cause
 from support.in_process import heavytop

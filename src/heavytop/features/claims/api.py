@@ -95,14 +95,14 @@ class ClaimLibrary(Tabular, Sequence[Entry]):
 
     def _table(self) -> TitledTable:
         counts = [sum(verdict.verdict == name for verdict in self.verdicts.values()) for name in _VERDICTS]
-        counted = ", ".join(f"{count} {_SAID[name]}" for name, count in zip(_VERDICTS, counts, strict=True) if count)
+        counted = ", ".join(f"{count} {_VERBS[name]}" for name, count in zip(_VERDICTS, counts, strict=True) if count)
         rows = [(entry.id, str(entry.source.year), self.verdicts[entry.id].verdict) for entry in self.entries]
         return TitledTable(f"{len(self.entries)} claims: {counted}", ("claim", "year", "verdict"), rows)
 
 
 _OPEN = "undecided"
 _VERDICTS = ("holds", "refuted", _OPEN)
-_SAID = {"holds": "hold", "refuted": "are refuted", _OPEN: "are undecided"}
+_VERBS = {"holds": "hold", "refuted": "are refuted", _OPEN: "are undecided"}
 
 
 def claim_library(

@@ -16,7 +16,8 @@ from heavytop.cases import Case
 from heavytop.errors import HeavyTopError
 from heavytop.exact.flint.balls import whole_evaluation, working_precision
 from heavytop.features.score.diagnose.readings import Seen, disagreement
-from heavytop.features.score.diagnose.samples import WORTH_ASKING, Diagnosis, FileAxes, rounded, turning_rate
+from heavytop.features.score.diagnose.samples import FileAxes, turning_rate
+from heavytop.features.score.diagnose.search import WORTH_ASKING, Diagnosis, rounded
 from heavytop.features.score.trajectories.observed import GivenTrajectory, Observed
 from heavytop.harness.plan import log_spaced
 from heavytop.harness.rows import Task, computed_row, data_of, seconds_a_step
@@ -160,20 +161,15 @@ def _disagreements(seen: Seen, times: Sequence[Fraction]) -> list[Diagnosis]:
 
 def used(observed: Observed) -> str:
     """Which columns were scored, and how they were read."""
-    said, parts = observed.said, []
-    for name in observed.names:
-        text = _WORDS[name]
-        if name == "quaternion":
-            text += f" ({said.quaternion_order}, {said.quaternion.replace('_', ' ')})"
-        elif name == "matrix":
-            text += f" ({said.matrix.replace('_', ' ')})"
-        elif name == "euler":
-            text += f" ({said.sequence}, {said.angles})"
-        elif name == "position":
-            text += " of the centre of mass" if said.point is None else " of the point"
-        parts.append(text)
-    up = "" if not set(observed.names) - {"omega", "gamma"} else f"; {said.up} points up"
-    return f"Scored: {', '.join(parts)}{up}."
+    said = observed.said
+    how = {
+        "quaternion": f" ({said.quaternion_order}, {said.quaternion.replace('_', ' ')})",
+        "matrix": f" ({said.matrix.replace('_', ' ')})",
+        "euler": f" ({said.sequence}, {said.angles})",
+        "position": " of the centre of mass" if said.point is None else " of the point",
+    }
+    up = f"; {said.up} points up" if set(observed.names) - {"omega", "gamma"} else ""
+    return f"Scored: {', '.join(_WORDS[name] + how.get(name, '') for name in observed.names)}{up}."
 
 
 PEER = "heyoka"
@@ -264,15 +260,15 @@ def assess(trajectory: GivenTrajectory, progress: Progress = lambda: None) -> As
     progress: called after each state that was compared, of the motion and of heyoka's: twice as often as there are any.
     """
     scored = measured(trajectory, progress)
-    count, told = len(_finite(trajectory)), _of_clock(trajectory, scored.row)
-    explained = scored if told is None else told[1]
-    said = diagnoses(trajectory if told is None else told[2], _size(explained.row), explained.errors) if count else []
+    count = len(_finite(trajectory))
+    clock, explained, moved = _of_clock(trajectory, scored.row) or (None, scored, trajectory)
+    said = diagnoses(moved, _size(explained.row), explained.errors) if count else []
     written = [] if trajectory.observed is not None else roundings(_finite(trajectory), trajectory.precision)
     single = [rounding.kind for rounding in written[:1]] == ["single"]
     peer = _peer(trajectory, scored, count, progress)
     columns = "" if trajectory.observed is None else used(trajectory.observed)
-    clock = [] if told is None else [told[0]]
-    return Assessment(scored.row, peer, clock + said, trajectory.format_guessed, single, columns, trajectory.cut)
+    said = said if clock is None else [clock, *said]
+    return Assessment(scored.row, peer, said, trajectory.format_guessed, single, columns, trajectory.cut)
 
 
 def _of_clock(trajectory: GivenTrajectory, row: Row) -> tuple[Diagnosis, Scored, GivenTrajectory] | None:
@@ -357,6 +353,7 @@ def _finite(trajectory: GivenTrajectory) -> list[tuple[Fraction, ...]]:
 
 
 def _size(row: Row) -> float | None:
+    """The largest |error|/max(1, |value|), or its bound; None without a reference."""
     metric = row.metrics.get(RELATIVE.text)
     if metric is None or not (_is_number(metric) or metric.bound is not None):
         return None

@@ -12,7 +12,8 @@ import msgspec
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from heavytop.features.score.diagnose.samples import AS_AT_START, FLOOR, VARIES, Diagnosis
+from heavytop.features.score.diagnose.samples import AS_AT_START, VARIES
+from heavytop.features.score.diagnose.search import FLOOR, Diagnosis
 from heavytop.features.score.measurement import Assessment, direction, passed
 from heavytop.measure.attitude_error import ATTITUDE_ERROR, JOINT_VIOLATION, POSITION_ERROR
 from heavytop.measure.scalar import digits_kept, digits_of, digits_right, digits_text

@@ -117,7 +117,7 @@ def _place(match: re.Match[str]) -> str:
 
 
 PAPER = ("ershkov-general", "ershkov-partial")
-_SEARCH, _MOST_FOUND = 6.0, 3
+_SEARCH, _MOST_ASSUMPTIONS = 6.0, 3
 """Seconds for assumptions that would decide a claim, and how many of them are said."""
 
 
@@ -205,7 +205,7 @@ def would_decide(
     deciding: list[tuple[str, str]] = []
     began = perf_counter()
     for bound in dict.fromkeys([*missing, *(f"{name} > 0" for name in claim.unassumed)]):
-        if perf_counter() - began + 2 * seconds > _SEARCH or len(deciding) == _MOST_FOUND:
+        if perf_counter() - began + 2 * seconds > _SEARCH or len(deciding) == _MOST_ASSUMPTIONS:
             break
         if (bound.replace(">", "!="), "holds") in deciding:  # more than is needed
             continue

@@ -306,11 +306,13 @@ def _through(
     near = set().union(*(e.free_symbols for e in (q, *parts)), *(x for x in held.values() if len(x) == 1))
     zeros = [z for z in zeros if held[z]]
     close = [z for z in zeros if held[z] <= near]
-    audits = (_found(u, q, chosen, parts) for chosen in ((close, zeros) if len(close) < len(zeros) else (zeros,)))
+    audits = (
+        _through_zeros(u, q, chosen, parts) for chosen in ((close, zeros) if len(close) < len(zeros) else (zeros,))
+    )
     return next((audit for audit in audits if audit is not None), None)
 
 
-def _found(
+def _through_zeros(
     u: sympy.Symbol, q: sympy.Expr, zeros: Sequence[sympy.Expr], parts: Sequence[sympy.Expr]
 ) -> tuple[sympy.Expr, sympy.Expr, sympy.Expr] | None:
     """Result of :func:`_through` by these zeros alone."""

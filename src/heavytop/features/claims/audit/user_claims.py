@@ -223,7 +223,7 @@ _VALUES = tuple(sympy.Rational(*pair) for pair in ((2, 3), (1, 3), (4, 5), (3, 5
 # the last for conditions with irrational numbers, which may have rational points at 0 only
 _SCALES = (1, -1, 1, -1, 20, -20, 0)
 _MOST_STEPS = 300
-_MOST_FOUND = 24
+_MOST_STATES = 24
 
 
 def states_on(
@@ -252,7 +252,7 @@ class _Search:
 
     def states(self, equations: Sequence[sympy.Expr]) -> Iterator[dict[sympy.Symbol, Fraction]]:
         """The states found, up to a number."""
-        yield from islice(self._solve([sympy.expand(equation) for equation in equations], {}, 0), _MOST_FOUND)
+        yield from islice(self._solve([sympy.expand(equation) for equation in equations], {}, 0), _MOST_STATES)
 
     def _solve(
         self, equations: list[sympy.Expr], known: dict[sympy.Symbol, sympy.Expr], depth: int

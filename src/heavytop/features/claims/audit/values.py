@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 # A number as it stands in print: its value, the unit of its last digit, and how many of its digits are right.
 
 
-_DECIMAL = re.compile(r"[+-]?(?P<whole>[0-9]*)(?:\.(?P<part>[0-9]*))?(?:[eEdD](?P<power>[+-]?[0-9]{1,5}))?")
+_DECIMAL = re.compile(r"[+-]?(?P<integer>[0-9]*)(?:\.(?P<part>[0-9]*))?(?:[eEdD](?P<power>[+-]?[0-9]{1,5}))?")
 _MINUS = "\N{MINUS SIGN}"
 _MOST_DIGITS = 1_000
 _LARGEST_POWER = 9_000
@@ -76,17 +76,17 @@ class PrintedNumber:
         """Raises InputError for an invalid decimal number, and for one of more than 1000 digits or beyond 1e±9000."""
         plain = text.strip().replace(_MINUS, "-")
         match = _DECIMAL.fullmatch(plain)
-        whole, part = (match["whole"], match["part"] or "") if match is not None else ("", "")
-        if match is None or not whole + part:
+        integer, part = (match["integer"], match["part"] or "") if match is not None else ("", "")
+        if match is None or not integer + part:
             raise InputError(f"{what} must be a decimal number; got {quoted(text)}.", _REMEDY)
         power = int(match["power"] or 0)
-        if len(whole + part) > _MOST_DIGITS or abs(power) > _LARGEST_POWER:
+        if len(integer + part) > _MOST_DIGITS or abs(power) > _LARGEST_POWER:
             raise InputError(
                 f"{what}: {quoted(text)} is too long a number.",
                 f"Give at most {_MOST_DIGITS} digits, and exponents up to {_LARGEST_POWER}.",
             )
         unit = Fraction(10) ** (power - len(part))
-        size = int(whole + part)
+        size = int(integer + part)
         digits = len(str(size)) if size else len(part) + 1
         return cls(text.strip(), (-size if plain.startswith("-") else size) * unit, unit, digits)
 

@@ -123,7 +123,7 @@ class ClaimEvaluation(Kind):
         for row in rows:
             if row.bits == bits and row.metrics:
                 forms.setdefault(row.key.subject.form, []).append(row)
-        sentences = "; ".join(f"the {form} form {_said(members)}" for form, members in sorted(forms.items()))
+        sentences = "; ".join(f"the {form} form {_summary(members)}" for form, members in sorted(forms.items()))
         if sentences:
             yield Headline(f"In {next(iter(forms.values()))[0].precision} {sentences}.")
         yield Cells(
@@ -141,7 +141,7 @@ def _cells(row: Row) -> list[Cell]:
     return [row.precision, row.key.subject.form, *map(Value, errors), *map(Value, times)]
 
 
-def _said(rows: Sequence[Row]) -> str:
+def _summary(rows: Sequence[Row]) -> str:
     """``is off by up to 6.7e-8 in Ω (ershkov-partial-6/forward), ψ not finite from |t| = 7.4``."""
     errors = ((row.metrics[Quantity(EVALUATION_ERROR, "omega", _WORST).text], row.case) for row in rows)
     times = ((row.metrics[Quantity(_COUNT, name, _SINCE).text], name) for row in rows for name in _SYMBOLS)

@@ -69,6 +69,28 @@ def quaternion(rotation: Any) -> Any:
     return column / np.linalg.norm(column)
 
 
+MUJOCO = """
+<mujoco>
+  <option gravity="0 0 {down}" integrator="{method}"><flag contact="disable"/></option>
+  <worldbody><body>
+    <joint type="ball"/><inertial pos="{centre}" mass="{mass}" fullinertia="{inertia}"/>
+  </body></worldbody>
+</mujoco>"""
+
+
+def mujoco_model(body: RigidBody, method: str) -> Any:
+    """Model and data of MuJoCo, which MJX takes over: a ball joint and a body, every number exactly."""
+    import mujoco
+
+    six = body.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    centre, inertia = (" ".join(repr(float(value)) for value in values) for values in (body.centre, six))
+    text = MUJOCO.format(method=method, centre=centre, inertia=inertia, mass=body.mass, down=-body.gravity)
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = body.quaternion, body.omega
+    return model, data
+
+
 def serve(name: str, engine: Any) -> None:
     """Answers requests until `quit` or the end of input."""
     request: dict[str, list[str]] = {}

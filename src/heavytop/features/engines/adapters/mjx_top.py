@@ -8,22 +8,8 @@ METHOD, BITS = sys.argv[1].split("-")
 os.environ["JAX_ENABLE_X64"] = str(BITS == "64")
 
 import jax  # noqa: E402
-import mujoco  # noqa: E402
-from heavytop_engine import serve  # noqa: E402
+from heavytop_engine import mujoco_model, serve  # noqa: E402
 from mujoco import mjx  # noqa: E402
-
-MODEL = """
-<mujoco>
-  <option gravity="0 0 {down}" integrator="{method}"><flag contact="disable"/></option>
-  <worldbody><body>
-    <joint type="ball"/><inertial pos="{centre}" mass="{mass}" fullinertia="{inertia}"/>
-  </body></worldbody>
-</mujoco>"""
-
-
-def text(values):
-    """Numbers of an attribute of MJCF, each exactly."""
-    return " ".join(repr(float(value)) for value in values)
 
 
 @jax.jit
@@ -36,11 +22,7 @@ class Engine:
     """MJX with a body about a fixed point."""
 
     def __init__(self, body):
-        six = body.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-        numbers = {"centre": text(body.centre), "mass": body.mass, "inertia": text(six), "down": -body.gravity}
-        model = mujoco.MjModel.from_xml_string(MODEL.format(method=METHOD, **numbers))
-        data = mujoco.MjData(model)
-        data.qpos[:], data.qvel[:] = body.quaternion, body.omega
+        model, data = mujoco_model(body, METHOD)
         self.model, self.data = mjx.put_model(model), mjx.put_data(model, data)
 
     def advance(self, step, count):

@@ -8,8 +8,8 @@ samples are judged by themselves as well, and where nothing does better a fall b
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import combinations, permutations, product
@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy
 
-from heavytop.features.score.diagnose.hypotheses import FALLS, UNITS_OF_OMEGA, other_axes
+from heavytop.features.score.diagnose.hypotheses import UNITS_OF_OMEGA, gauss_newton, other_axes
 from heavytop.features.score.diagnose.readings import (
     Beginning,
     BodyData,
@@ -32,24 +32,22 @@ from heavytop.features.score.diagnose.readings import (
     simulate,
     turning,
 )
-from heavytop.features.score.diagnose.samples import (
-    ALIKE,
+from heavytop.features.score.diagnose.samples import looked_at, named, notable, principal, refused
+from heavytop.features.score.diagnose.search import (
+    AS_LIKELY,
     DROP,
     FIRST,
     FITTED_DROP,
-    FLOOR,
     LIKELY_DROP,
     WORTH_ASKING,
     Array,
     Diagnosis,
-    looked_at,
-    named,
-    notable,
-    principal,
-    refused,
+    Hypothesis,
+    Search,
+    scope,
 )
 from heavytop.measure.attitude_error import FORMS
-from heavytop.precision import decimal_text, plain_decimal
+from heavytop.precision import decimal_text
 from heavytop.top.attitude import SEQUENCES
 
 _NEIGHBOURS = 60
@@ -58,10 +56,7 @@ _TWO_MISTAKES = 0.05
 """Relative errors below it are not those of two mistakes of convention at once."""
 _CONTRADICTS = 0.1
 """Ω that is off the rate of the attitude by less, relative to it, may be as right as the method."""
-AS_LIKELY = 3.0
-"""Of likely suppositions whose errors differ by less, the simplest is named."""
-_REFINED = 4
-_NO_SHIFT = Fraction(0)
+_REFINED = 8
 _FEWEST = 4
 """Samples to which the six numbers of a start, or one of the body, are fitted."""
 _SLIGHT = 1e-6
@@ -70,9 +65,9 @@ _ROUND = 3
 """Digits of a factor that no method's own error has by accident."""
 _START_DROP = 1e5
 """How far the error must fall for a start, whose six numbers may also carry the errors of first steps."""
-Move = Callable[[Any], tuple[BodyData, Beginning]]
-"""A body and a start from numbers that are 0 for those of the file."""
-_MOST_OTHERS = 3
+Row = tuple[str, dict[str, str], dict[str, Any]]
+"""A mistake: its kind, numbers, and what is supposed, as in :meth:`Suppositions.errors_if`; ``drop``, ``is_round``."""
+_FITTED = {"drop": FITTED_DROP}
 _SAME = 1e-9
 """A rotation that was fitted is a renaming of the axes within that."""
 _LENGTHS = {"1000": 1e3, "100": 1e2, "1/1000": 1e-3, "1/100": 1e-2, "1/0.3048": 1 / 0.3048, "0.3048": 0.3048}
@@ -90,86 +85,38 @@ _INERTIAS = {f"1e{power}": 10.0**power for power in (-9, -7, -6, -4, -3, -2, 2, 
 BOTH, COLUMNS, START, DATA, RATES = "start and columns", "columns", "start", "data", "rates"
 
 
-@dataclass(frozen=True, slots=True)
-class _Try:
-    """One supposition: how columns and start are read, and the body.  drop: how far the error must fall.
-
-    shift: the file's columns are those of t + shift; of Ω alone where ``rates``.  still: the columns of Ω are 0.
-    mixed: a quantity, and the matrix by which the rows of its columns are to be multiplied.  begin: of the motion.
-    is_round: whether a number that was fitted is one of three digits.
-    """
-
-    kind: str
-    numbers: dict[str, str] = field(default_factory=dict)
-    columns: Reading | None = None
-    start: Reading | None = None
-    body: BodyData | None = None
-    drop: float = DROP
-    shift: Fraction = Fraction(0)
-    rates: bool = False
-    still: bool = False
-    mixed: tuple[str, Array] | None = None
-    begin: Beginning | None = None
-    is_round: bool = False
-
-    def least_fall(self, likely: float) -> float:
-        """How far the error must fall; by less, ``likely`` or for a round number DROP, where it need only be likely."""
-        return self.drop if not likely else likely if self.drop == DROP else DROP if self.is_round else self.drop
-
-
-def _course(
-    seen: Seen,
-    start: Reading | None = None,
-    body: BodyData | None = None,
-    shift: Fraction = _NO_SHIFT,
-    begin: Beginning | None = None,
-) -> Course | None:
-    """The motion of the file with another reading of its start, another body, other times, another start."""
-    body = body or seen.body
-    begin = begin or seen.start.begin(start or seen.said, body.tensor)
-    return simulate(body, begin, tuple(float(time + shift if shift else time) for time in seen.times))
-
-
-class Suppositions:
+class Suppositions(Search):
     """Mistakes that a file may have, and the error of each of its samples with them.
 
     step: of the method, where the file says it.
     """
 
+    names_others = True
+
     def __init__(self, seen: Seen, step: Fraction | None = None) -> None:
         self.step, self.start = step, seen.start.begin(seen.said, seen.body.tensor)
         rate = turning(seen.body, self.start)
         self.every, self.seen = seen, seen.at(looked_at(list(map(float, seen.times)), rate))
-        first = FIRST[-1] + (not self.seen.times[0])
-        self.early = self.seen.at(list(range(min(len(self.seen.times), first))))
-        self.own = errors(self.seen, _course(self.seen), seen.said, seen.body)
-        self.tried: list[tuple[_Try, Array]] = []
+        self.times, self.states = self.seen.times, len(seen.times)
+        first = FIRST[-1] + (not self.times[0])
+        self.early = self.seen.at(list(range(min(len(self.times), first))))
+        self.own = self.errors_if(self.seen)
 
-    def sure(self, first: int | None = None, drop: float = 0.0) -> Diagnosis | None:
-        """The simplest mistake among those that explain the columns about as well as the best; None where none does.
+    def hypotheses(self) -> Iterator[Hypothesis]:
+        """The simplest first, those with a fitted number last."""
+        return map(self._tried, _suppositions(self))
 
-        first: of the first samples alone, where no number is fitted.  drop: a smaller one than usual.
-        """
-        looked = len(self.own) if first is None else first + (not self.seen.times[0])
-        own = float(self.own[:looked].max())
-        if not own > WORTH_ASKING or looked > len(self.own):
-            return None
-        own = own if numpy.isfinite(own) else 1.0
-        if not self.tried:
-            self.tried = [(attempt, self._left(attempt)) for attempt in _suppositions(self)]
-        tried = [(attempt, each_error) for attempt, each_error in self.tried if first is None or attempt.drop == DROP]
-        best = self._best(tried, own, looked, drop)
-        if best is None and first is None and not drop and own > _TWO_MISTAKES and _forms(self.seen) & set(FORMS):
-            pairs = [(attempt, self._left(attempt)) for attempt in _pairs(self.seen)]
-            best = self._best(pairs, own, looked)
-        return best
+    def further(self, diagnosis: Diagnosis | None, own: float) -> Iterator[Hypothesis]:
+        """Two readings at once."""
+        if diagnosis is None and own > _TWO_MISTAKES and _forms(self.seen) & set(FORMS):
+            yield from map(self._tried, _pairs(self.seen))
 
     def of_start(self) -> Diagnosis | None:
         """Another start: with its six numbers it also follows what is only early or late, and is tried last."""
         own = float(self.own.max())
         if not WORTH_ASKING < own < numpy.inf or len(self.own) < _FEWEST:
             return None
-        return self._best([(attempt, self._left(attempt)) for attempt in _start(self)], own, len(self.own))
+        return self.best([*map(self._tried, _start(self))], own)
 
     def of_rates(self) -> Diagnosis | None:
         """The simplest reading of the columns in which Ω is the rate of the attitude; it needs no motion."""
@@ -183,13 +130,8 @@ class Suppositions:
             key=lambda entry: entry[0],
             default=(own, "", {}),
         )
-        return self._told(kind, {**numbers, "of": RATES}, own, left, seen) if left * DROP <= own else None
-
-    def _told(self, kind: str, numbers: dict[str, str], own: float, left: float, seen: Seen) -> Diagnosis:
-        """The diagnosis, found in the samples that were ``seen``."""
-        looked, states = len(seen.times), len(self.every.times)
-        until = None if looked == states else (looked, states, plain_decimal(seen.times[-1], 6))
-        return Diagnosis(kind, numbers, own, left, until)
+        looked = scope(seen.times, self.states)
+        return Diagnosis(kind, {**numbers, "of": RATES}, own, left, looked) if left * DROP <= own else None
 
     @cached_property
     def refused(self) -> float:
@@ -200,63 +142,69 @@ class Suppositions:
         early, largest = (max((float(numpy.abs(values).max()) for values in part), default=1.0) for part in rates)
         return refused(early, largest, float(self.own.max()))
 
-    def _left(self, attempt: _Try) -> Array:
-        """The error of each sample; where a motion has to be computed, infinite behind the first if these refuse it."""
-        if attempt.start is not None or attempt.body is not None or attempt.shift or attempt.begin is not None:
-            early = self._error(attempt, self.early)
-            if not float(early.max()) <= self.refused:
-                return numpy.append(early, numpy.full(len(self.own) - len(early), numpy.inf))
-        return self._error(attempt, self.seen)
+    def _tried(self, row: Row) -> Hypothesis:
+        """The hypothesis; of a motion that has to be computed, errors behind first ones that refuse it are infinite."""
+        kind, numbers, supposed = row
+        judged = {name: supposed[name] for name in ("drop", "is_round") if name in supposed}
+        supposed = {name: value for name, value in supposed.items() if name not in judged}
+        left = self.errors_if(self.early, **supposed)
+        if supposed.keys() & {"start", "body", "shift", "begin"} and not float(left.max()) <= self.refused:
+            left = numpy.append(left, numpy.full(len(self.own) - len(left), numpy.inf))
+        else:
+            left = self.errors_if(self.seen, **supposed)
+        return Hypothesis(kind, {"of": DATA, **numbers}, left, **judged)
 
-    @staticmethod
-    def _error(attempt: _Try, seen: Seen) -> Array:
-        body, plain = attempt.body or seen.body, _course(seen) if attempt.rates else None
-        course = _course(seen, attempt.start, body, attempt.shift, attempt.begin)
-        if attempt.body is not None and seen.point is seen.body.centre:
+    def course(
+        self,
+        seen: Seen,
+        start: Reading | None = None,
+        body: BodyData | None = None,
+        shift: Fraction = Fraction(0),
+        begin: Beginning | None = None,
+    ) -> Course | None:
+        """The motion of the file with another reading of its start, another body, other times, another start."""
+        body = body or seen.body
+        begin = begin or seen.start.begin(start or seen.said, body.tensor)
+        return simulate(body, begin, tuple(float(time + shift if shift else time) for time in seen.times))
+
+    def errors_if(
+        self,
+        seen: Seen,
+        columns: Reading | None = None,
+        body: BodyData | None = None,
+        rates: bool = False,
+        still: bool = False,
+        mixed: tuple[str, Array] | None = None,
+        **supposed: Any,
+    ) -> Array:
+        """The error of each sample where columns and start are read so, or the body is another.
+
+        shift: the columns are those of t + shift; of Ω alone where ``rates``.  still: Ω is not looked at.
+        mixed: a quantity, and the matrix by which the rows of its columns are to be multiplied.
+        begin: of the motion.
+        """
+        course, plain = self.course(seen, body=body, **supposed), self.course(seen) if rates else None
+        if body is not None and seen.point is seen.body.centre:
             seen = replace(seen, point=body.centre)
         if course is not None and plain is not None:
             in_body = numpy.einsum("nji,nj->ni", plain.rotation, course.omega_space)
             course = Course(plain.rotation, in_body if "omega_space" in seen.columns else course.omega)
-        if attempt.still:
+        if still:
             seen = replace(seen, columns={k: v for k, v in seen.columns.items() if not k.startswith("omega")})
-        if attempt.mixed is not None:
-            name, matrix = attempt.mixed
+        if mixed is not None:
+            name, matrix = mixed
             seen = replace(seen, columns={**seen.columns, name: seen.columns[name] @ matrix})
-        return errors(seen, course, attempt.columns or seen.said, body)
-
-    def _best(
-        self, tried: Sequence[tuple[_Try, Array]], own: float, looked: int, drop: float = 0.0
-    ) -> Diagnosis | None:
-        largest = [(attempt, float(left[:looked].max())) for attempt, left in tried]
-        explained = [(attempt, left) for attempt, left in largest if left * attempt.least_fall(drop) <= own]
-        if not explained:
-            return None
-        best = min(max(left, FLOOR) for _, left in explained)
-        alike = [(attempt, left) for attempt, left in explained if left <= (AS_LIKELY if drop else ALIKE) * best]
-        first, _ = alike[0]
-        first, left = _of_kind(first.kind, alike)
-        # with a number that was fitted more can be explained
-        equal = [pair for pair in alike if pair[0].drop <= first.drop and pair[0].kind != first.kind]
-        kinds = list(dict.fromkeys(attempt.kind for attempt, _ in equal))[:_MOST_OTHERS]
-        others = tuple(Diagnosis(kind, {"of": DATA, **_of_kind(kind, equal)[0].numbers}) for kind in kinds)
-        numbers = {"of": DATA, **first.numbers} | ({"or": ", ".join(kinds)} if kinds else {})
-        diagnosis = self._told(first.kind, numbers, own, left, self.seen.at([*range(looked)]))
-        return replace(diagnosis, likely=bool(drop), others=others)
+        return errors(seen, course, columns or seen.said, body or seen.body)
 
 
-def _of_kind(kind: str, tried: Sequence[tuple[_Try, float]]) -> tuple[_Try, float]:
-    """The attempt of a kind whose number fits best, and the error that it leaves."""
-    return min((pair for pair in tried if pair[0].kind == kind), key=lambda pair: max(pair[1], FLOOR))
-
-
-def _suppositions(suppositions: Suppositions) -> Iterator[_Try]:
+def _suppositions(suppositions: Suppositions) -> Iterator[Row]:
     """The simplest first, those with a fitted number last."""
     seen = suppositions.seen
     for kind, numbers, reading in _readings(seen):
         yield from _scopes(seen, kind, numbers, reading)
     # before the axis that points up: where both fit, the third axis points down
     for kind, numbers, body in _bodies(seen):
-        yield _Try(kind, numbers, body=body)
+        yield kind, numbers, {"body": body}
         if kind == "gravity_sign":
             for other, more, reading in _axes_of_space(seen):
                 yield from _scopes(seen, other, more, reading)
@@ -264,26 +212,25 @@ def _suppositions(suppositions: Suppositions) -> Iterator[_Try]:
     yield from _positions(seen)
     yield from _renamed(seen)
     yield from _columns(seen)
-    course = _course(seen)
+    course = suppositions.course(seen)
     if course is not None:
         yield from _fitted(seen, course)
-        yield from _early_rates(suppositions, course)
+        yield from _early_rates(suppositions)
         yield from _data(suppositions)
 
 
-def _steps(suppositions: Suppositions) -> Iterator[_Try]:
+def _steps(suppositions: Suppositions) -> Iterator[Row]:
     """All columns, or Ω alone, half a step or a step of the method early or late; Ω that is 0 throughout."""
-    rates = [values for name, values in suppositions.seen.columns.items() if name.startswith("omega")]
-    if rates and not any(values.any() for values in rates) and len(suppositions.seen.columns) > len(rates):
-        yield _Try("omega_zero", still=True)
-    for part, shift in product((Fraction(1, 2), Fraction(1)), (-1, 1)):
-        if suppositions.step:
-            by = shift * part * suppositions.step
-            whole = _Try("times_shifted", {"shift": _signed(by)}, shift=by)
-            yield whole
-            if rates and len(suppositions.seen.columns) > len(rates):
-                text = f"{'half a step' if part < 1 else 'one step'} {'early' if shift < 0 else 'late'}"
-                yield replace(whole, kind="omega_shifted", numbers={**whole.numbers, "steps": text}, rates=True)
+    rates = {name: values for name, values in suppositions.seen.columns.items() if name.startswith("omega")}
+    has_more = bool(rates) and len(suppositions.seen.columns) > len(rates)
+    if has_more and not any(values.any() for values in rates.values()):
+        yield "omega_zero", {}, {"still": True}
+    for part, sign in product((Fraction(1, 2), Fraction(1)), (-1, 1)) if suppositions.step else ():
+        shift = sign * part * (suppositions.step or 0)
+        yield "times_shifted", {"shift": _signed(shift)}, {"shift": shift}
+        if has_more:
+            text = f"{'half a step' if part < 1 else 'one step'} {'early' if sign < 0 else 'late'}"
+            yield "omega_shifted", {"shift": _signed(shift), "steps": text}, {"shift": shift, "rates": True}
 
 
 _WORDS = {
@@ -298,7 +245,7 @@ _WORDS = {
 _UNITS = {"−1": -1.0, "180/π": 180 / numpy.pi, "π/180": numpy.pi / 180}
 
 
-def _columns(seen: Seen) -> Iterator[_Try]:
+def _columns(seen: Seen) -> Iterator[Row]:
     """One column with the other sign or in another unit of angle, and two columns in each other's place."""
     if seen.columns.keys() <= {"omega", "gamma"}:  # hypotheses of states read these in any order
         return
@@ -312,46 +259,45 @@ def _columns(seen: Seen) -> Iterator[_Try]:
             for factor, value in _UNITS.items():
                 if value < 0 or quantity in ("euler", "omega", "omega_space"):
                     matrix = unit / numpy.where(numpy.arange(len(names)) == place, value, 1.0)
-                    yield _Try("column_scaled", {"column": name, "factor": factor}, mixed=(quantity, matrix))
+                    yield "column_scaled", {"column": name, "factor": factor}, {"mixed": (quantity, matrix)}
         for i, j in combinations(range(len(names)), 2):
             order = [{i: j, j: i}.get(place, place) for place in range(len(names))]
             numbers = {"columns": f"{names[i]} and {names[j]}"}
-            yield _Try("column_order", numbers, mixed=(quantity, unit[:, order]))
+            yield "column_order", numbers, {"mixed": (quantity, unit[:, order])}
 
 
-def _data(suppositions: Suppositions) -> Iterator[_Try]:
-    """One number of the body that is another, or another start, by Gauss-Newton."""
-    seen, begin = suppositions.seen, suppositions.start
+def _data(suppositions: Suppositions) -> Iterator[Row]:
+    """One number of the body that is another."""
+    seen = suppositions.seen
     for kind, numbers, key, part in _scalable(seen.body) if len(seen.times) >= _FEWEST else ():
 
-        def body_of(x: Array, key: str = key, part: Any = part) -> tuple[BodyData, Beginning]:
+        def body_of(x: Array, key: str = key, part: Any = part) -> dict[str, Any]:
             scaled: dict[str, Any] = {key: getattr(seen.body, key) * (1.0 + part * x[0])}
-            return replace(seen.body, **scaled), begin
+            return {"body": replace(seen.body, **scaled)}
 
         x, left = _refined(suppositions, body_of, 1, DROP)
         factor = named(1.0 + float(x[0]), max(AS_LIKELY * left, _SAME)) if abs(x[0]) < numpy.inf else Fraction(1)
         if notable(factor, Fraction(1)):
-            body, _ = body_of(numpy.array([float(factor) - 1]))
             is_round = Fraction(decimal_text(factor, _ROUND)) == factor and factor != 1
             numbers = {**numbers, "factor": decimal_text(factor, 8)}
             if key == "rotor" and factor == -1:
                 kind, numbers = "rotor_sign", {}
-            yield _Try(kind, numbers, body=body, drop=FITTED_DROP, is_round=is_round)
+            yield kind, numbers, {**body_of(numpy.array([float(factor) - 1])), **_FITTED, "is_round": is_round}
 
 
-def _start(suppositions: Suppositions) -> Iterator[_Try]:
+def _start(suppositions: Suppositions) -> Iterator[Row]:
     """Another attitude and another Ω at t = 0."""
     seen, begin = suppositions.seen, suppositions.start
     size = float(numpy.linalg.norm(begin.omega)) or turning(seen.body, begin)
 
-    def start_of(x: Array) -> tuple[BodyData, Beginning]:
-        return seen.body, Beginning(begin.rotation @ _turn(x[:3]), begin.omega + size * x[3:])
+    def start_of(x: Array) -> dict[str, Any]:
+        return {"begin": Beginning(begin.rotation @ _turn(x[:3]), begin.omega + size * x[3:])}
 
     x, _ = _refined(suppositions, start_of, 6, _START_DROP)
     if _SAME < (off := float(numpy.abs(x).max())) < numpy.inf:
-        elsewhere = start_of(x)[1]
-        numbers = {"angle": _angle(_turn(x[:3])), "omega": _list(elsewhere.omega)}
-        yield _Try("start", numbers, begin=elsewhere, drop=_START_DROP * max(1.0, float(suppositions.own.max()) / off))
+        supposed = start_of(x)
+        numbers = {"angle": _angle(_turn(x[:3])), "omega": _list(supposed["begin"].omega)}
+        yield "start", numbers, {**supposed, "drop": _START_DROP * max(1.0, float(suppositions.own.max()) / off)}
 
 
 def _scalable(body: BodyData) -> Iterator[tuple[str, dict[str, str], str, Any]]:
@@ -368,32 +314,24 @@ def _scalable(body: BodyData) -> Iterator[tuple[str, dict[str, str], str, Any]]:
             yield "top", {"number": f"Number {i + 1} of the centre"}, "centre", unit
 
 
-def _refined(suppositions: Suppositions, move: Move, count: int, drop: float) -> tuple[Array, float]:
-    """The numbers that fit best, as far as each step of Gauss-Newton makes the error smaller, and what it leaves.
+def _refined(
+    suppositions: Suppositions, supposed: Callable[[Array], dict[str, Any]], count: int, drop: float
+) -> tuple[Array, float]:
+    """The numbers that fit best, 0 for those of the file, and the error that they leave.
 
     drop: how far the error must fall at least; numbers that do not do that to the first samples are refined no more.
     """
     refused = suppositions.refused * LIKELY_DROP / drop
-    x, here = numpy.zeros(count), numpy.zeros(1)
+    x = numpy.zeros(count)
     for seen in (suppositions.early, suppositions.seen):
 
         def off(x: Array, seen: Seen = seen) -> Array:
-            body, begin = move(x)
-            course = _course(seen, body=body, begin=begin)
+            changes = supposed(x)
+            course = suppositions.course(seen, **changes)
+            body = changes.get("body", seen.body)
             return numpy.full(1, numpy.inf) if course is None else residuals(seen, course, seen.said, body)
 
-        here = off(x)
-        for _ in range(2 * _REFINED):
-            slopes = [(off(x + _SLIGHT * unit) - here) / _SLIGHT for unit in numpy.eye(count)]
-            if not all(numpy.isfinite(part).all() for part in (here, *slopes)):
-                break
-            after = x - numpy.linalg.lstsq(numpy.stack(slopes, axis=1), here, rcond=None)[0]
-            there = off(after)
-            if not float(there @ there) < float(here @ here):
-                break
-            falls, x, here = float(here @ here) > FALLS * float(there @ there), after, there
-            if not falls:
-                break  # at the least of it
+        x, here = gauss_newton(off, x, _SLIGHT, _REFINED)
         if float(numpy.linalg.norm(here)) > refused * len(here) ** 0.5:
             break
     return x, float(numpy.abs(here).max())
@@ -405,46 +343,43 @@ def _turn(vector: Array) -> Array:
     return nearest_rotation(numpy.eye(3) + numpy.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]]))
 
 
-def _early_rates(suppositions: Suppositions, course: Course) -> Iterator[_Try]:
+def _early_rates(suppositions: Suppositions) -> Iterator[Row]:
     """Ω alone of other times, by as much as fits."""
-    seen, small = suppositions.seen, Fraction(1, 10**6) / Fraction(turning(suppositions.seen.body, suppositions.start))
+    seen, small = suppositions.seen, 1e-6 / turning(suppositions.seen.body, suppositions.start)
     name = next((name for name in ("omega", "omega_space") if name in seen.columns), None)
     if name is None or len(seen.columns) < 2 or len(seen.times) < 3:
         return
     values = seen.said.vectors(seen.columns[name], True) if name == "omega_space" else seen.columns[name]
-    shift = Fraction(0)
-    for _ in range(_REFINED):
-        here, there = (_course(seen, shift=at) for at in (shift, shift + small))
-        if here is None or there is None:
-            return
-        at_shift, later = (getattr(rates, name) for rates in (here, there))
-        slope = (later - at_shift) / float(small)
-        square = float((slope * slope).sum())
-        if not 0 < square < numpy.inf or not numpy.isfinite(values).all():
-            return
-        shift += Fraction(float(((values - at_shift) * slope).sum()) / square)
-        shift = max(-seen.times[-1], min(seen.times[-1], shift)) if seen.times[-1] > 0 else shift
-    numbers = {"shift": _signed(Fraction(decimal_text(shift, 6)))}
-    yield _Try("omega_shifted", numbers, shift=shift, rates=True, drop=FITTED_DROP)
+
+    def off(x: Array) -> Array:
+        within = abs(x[0]) <= abs(seen.times[-1])
+        course = suppositions.course(seen, shift=Fraction(x[0])) if within else None
+        return numpy.full(1, numpy.inf) if course is None else (getattr(course, name) - values).reshape(-1)
+
+    x, here = gauss_newton(off, numpy.zeros(1), small, _REFINED)
+    if numpy.isfinite(here).all():
+        shift = Fraction(x[0])
+        numbers = {"shift": _signed(Fraction(decimal_text(shift, 6)))}
+        yield "omega_shifted", numbers, {"shift": shift, "rates": True, **_FITTED}
 
 
 def _signed(shift: Fraction) -> str:
     return f"{'−' if shift < 0 else '+'} {decimal_text(abs(shift), 6)}"
 
 
-def _scopes(seen: Seen, kind: str, numbers: dict[str, str], reading: Reading) -> Iterator[_Try]:
+def _scopes(seen: Seen, kind: str, numbers: dict[str, str], reading: Reading) -> Iterator[Row]:
     """The reading of start and columns, of the columns, of the start: as far as each is another than was said."""
     inertia = seen.body.tensor
     before, after = (seen.start.begin(columns, inertia) for columns in (seen.said, reading))
     moved = not (numpy.array_equal(before.rotation, after.rotation) and numpy.array_equal(before.omega, after.omega))
     if moved:
-        yield _Try(kind, {**numbers, "of": BOTH}, reading, reading)
-    yield _Try(kind, {**numbers, "of": COLUMNS}, reading)
+        yield kind, {**numbers, "of": BOTH}, {"columns": reading, "start": reading}
+    yield kind, {**numbers, "of": COLUMNS}, {"columns": reading}
     if moved:
         if kind == "omega_frame":
             space = not seen.start.in_space
             numbers = {"frame": "space" if space else "body", "key": f"omega{'_space' if space else ''} at t = 0"}
-        yield _Try(kind, {**numbers, "of": START}, start=reading)
+        yield kind, {**numbers, "of": START}, {"start": reading}
 
 
 def _forms(seen: Seen) -> set[str]:
@@ -457,18 +392,29 @@ Named = tuple[str, dict[str, str], Reading]
 def _readings(seen: Seen) -> Iterator[Named]:
     """Readings without a number, the likeliest first."""
     said, forms = seen.said, _forms(seen)
-    if "quaternion" in forms:
-        order, other = "wxyz" if said.scalar_last else "xyzw", _other(said.conjugate)
-        yield "scalar_last", {"quaternion_order": order}, replace(said, scalar_last=not said.scalar_last)
-        yield "conjugate", {"quaternion": other}, replace(said, conjugate=not said.conjugate)
-    if "matrix" in forms:
-        yield "transposed", {"matrix": _other(said.transposed)}, replace(said, transposed=not said.transposed)
-    if "euler" in forms:
-        yield from _angles(said)
-    yield from _vectors(said, forms)
-    if "quaternion" in forms:
-        both = replace(said, scalar_last=not said.scalar_last, conjugate=not said.conjugate)
-        yield "scalar_last_conjugate", {}, both
+    scalar, conjugate = {"scalar_last": not said.scalar_last}, {"conjugate": not said.conjugate}
+    frame = "body" if "omega_space" in forms else "space"
+    sequences = [{"sequence": sequence} for sequence in SEQUENCES if sequence != said.sequence]
+    rows: list[tuple[str, str, dict[str, str], dict[str, Any]]] = [
+        ("quaternion", "scalar_last", {"quaternion_order": "wxyz" if said.scalar_last else "xyzw"}, scalar),
+        ("quaternion", "conjugate", {"quaternion": _other(said.conjugate)}, conjugate),
+        ("matrix", "transposed", {"matrix": _other(said.transposed)}, {"transposed": not said.transposed}),
+        ("euler", "degrees", {"unit": "radians" if said.degrees else "degrees"}, {"degrees": not said.degrees}),
+        ("euler", "extrinsic", {"sequence": said.sequence}, {"extrinsic": True}),
+        ("euler", "angles_negated", {}, {"negated": True}),
+        *(("euler", "sequence", other, other) for other in sequences),
+        *(("euler", "extrinsic", other, {**other, "extrinsic": True}) for other in sequences),
+        ("euler", "angles_of_inverse", {}, {"negated": True, "extrinsic": True}),
+        ("omega", "omega_frame", {"frame": frame, "key": f"frame = {frame}"}, {"swapped": True}),
+        *(("omega", f"omega_in_{unit}", {}, {"omega": factor}) for unit, factor in UNITS_OF_OMEGA.items()),
+        ("omega", "omega_reversed", {}, {"omega": -1.0}),
+        ("omega", "momentum", {}, {"momentum": True}),
+        ("gamma", "gamma_down", {}, {"gamma": -1.0}),
+        ("quaternion", "scalar_last_conjugate", {}, {**scalar, **conjugate}),
+    ]
+    named_so = {"omega_space": "omega", "rows": "gamma"}
+    given = {named_so.get(form, form) for form in forms}
+    yield from ((kind, numbers, replace(said, **changes)) for form, kind, numbers, changes in rows if form in given)
 
 
 def _other(inverse: bool) -> str:
@@ -486,31 +432,6 @@ def _axes_of_space(seen: Seen) -> Iterator[Named]:
         for pseudo in (True, False):
             numbers = {"axis": "xyz"[axis]}
             yield "left_handed", numbers, replace(said, mirror=axis, pseudo=pseudo)
-
-
-def _vectors(said: Reading, forms: set[str]) -> Iterator[Named]:
-    if forms & {"omega", "omega_space"}:
-        frame = "body" if "omega_space" in forms else "space"
-        yield "omega_frame", {"frame": frame, "key": f"frame = {frame}"}, replace(said, swapped=True)
-        for unit, factor in UNITS_OF_OMEGA.items():
-            yield f"omega_in_{unit}", {}, replace(said, omega=factor)
-        yield "omega_reversed", {}, replace(said, omega=-1.0)
-        yield "momentum", {}, replace(said, momentum=True)
-    if forms & {"gamma", "rows"}:
-        yield "gamma_down", {}, replace(said, gamma=-1.0)
-
-
-def _angles(said: Reading) -> Iterator[Named]:
-    """Euler angles in another unit, another sequence, about axes of space, with other signs, and two of these."""
-    yield "degrees", {"unit": "radians" if said.degrees else "degrees"}, replace(said, degrees=not said.degrees)
-    yield "extrinsic", {"sequence": said.sequence}, replace(said, extrinsic=True)
-    yield "angles_negated", {}, replace(said, negated=True)
-    others = [sequence for sequence in SEQUENCES if sequence != said.sequence]
-    for sequence in others:
-        yield "sequence", {"sequence": sequence}, replace(said, sequence=sequence)
-    for sequence in others:
-        yield "extrinsic", {"sequence": sequence}, replace(said, sequence=sequence, extrinsic=True)
-    yield "angles_of_inverse", {}, replace(said, negated=True, extrinsic=True)
 
 
 def _bodies(seen: Seen) -> Iterator[tuple[str, dict[str, str], BodyData]]:
@@ -568,21 +489,22 @@ def _in_space_axes(seen: Seen) -> Iterator[tuple[str, dict[str, str], BodyData]]
         yield "data_in_space_axes", {}, replace(body, inertia=turned, centre=centre)
 
 
-def _positions(seen: Seen) -> Iterator[_Try]:
+def _positions(seen: Seen) -> Iterator[Row]:
     """Positions that are displacements, of another unit or sign."""
     if "position" not in seen.columns:
         return
-    said = seen.said
-    yield _Try("displacement", columns=replace(said, displaced=True))
-    yield _Try("position_reversed", columns=replace(said, scale=-1.0))
+    rows: list[tuple[str, dict[str, str], dict[str, Any]]] = [
+        ("displacement", {}, {"displaced": True}),
+        ("position_reversed", {}, {"scale": -1.0}),
+    ]
     for name, factor in _LENGTHS.items():
-        yield _Try("position_unit", {"factor": name}, replace(said, scale=factor))
-        yield _Try("position_unit", {"factor": name}, replace(said, scale=factor, displaced=True))
+        rows += [("position_unit", {"factor": name}, {"scale": factor, "displaced": moved}) for moved in (False, True)]
     if seen.body.centre.any() and not numpy.array_equal(seen.point, seen.body.centre):
-        yield _Try("position_of_centre", columns=replace(said, point=tuple(seen.body.centre)))
+        rows.append(("position_of_centre", {}, {"point": tuple(seen.body.centre)}))
+    yield from ((kind, numbers, {"columns": replace(seen.said, **changes)}) for kind, numbers, changes in rows)
 
 
-def _renamed(seen: Seen) -> Iterator[_Try]:
+def _renamed(seen: Seen) -> Iterator[Row]:
     """Axes of the body or of space in another order or reversed, without a mirror image."""
     for matrix, axes in _rotations():
         for part, kind in (("space", "space_axes"), ("body", "body_axes")):
@@ -605,7 +527,7 @@ def _square(matrix: Array) -> Square:
     return tuple(map(tuple, matrix.tolist()))
 
 
-def _fitted(seen: Seen, course: Course) -> Iterator[_Try]:
+def _fitted(seen: Seen, course: Course) -> Iterator[Row]:
     """Constant rotations of space and body axes, another point, another place of the pivot, factors."""
     if len(seen.times) < 3:
         return
@@ -618,18 +540,16 @@ def _fitted(seen: Seen, course: Course) -> Iterator[_Try]:
     true = course.rotation @ point
     size = float((true * true).sum())
     if size:
-        yield from _near(
-            "position_unit", "factor", float((positions * true).sum()) / size, lambda value: replace(said, scale=value)
-        )
+        yield from _near("position_unit", float((positions * true).sum()) / size, said, "scale")
     offset = (positions - true).mean(axis=0)
-    yield _Try("pivot", {"offset": _list(offset)}, replace(said, offset=tuple(offset)), drop=FITTED_DROP)
+    yield "pivot", {"offset": _list(offset)}, {"columns": replace(said, offset=tuple(offset)), **_FITTED}
     own = numpy.einsum("nji,nj->ni", course.rotation, positions).mean(axis=0)
-    yield _Try("point", {"point": _list(own)}, replace(said, point=tuple(own)), drop=FITTED_DROP)
+    yield "point", {"point": _list(own)}, {"columns": replace(said, point=tuple(own)), **_FITTED}
     both = _point_and_offset(course, positions)
     if both is not None:
         reading = replace(said, point=tuple(both[:3]), offset=tuple(both[3:]))
         numbers = {"point": _list(both[:3]), "offset": _list(both[3:])}
-        yield _Try("point_and_pivot", numbers, reading, drop=FITTED_DROP)
+        yield "point_and_pivot", numbers, {"columns": reading, **_FITTED}
 
 
 def _point_and_offset(course: Course, positions: Array) -> Array | None:
@@ -640,7 +560,7 @@ def _point_and_offset(course: Course, positions: Array) -> Array | None:
     return solution
 
 
-def _turned(seen: Seen, course: Course) -> Iterator[_Try]:
+def _turned(seen: Seen, course: Course) -> Iterator[Row]:
     """A rotation of the axes of space, or of the body, that is the same in every sample."""
     for form in ("quaternion", "matrix", "euler"):
         if form not in seen.columns:
@@ -652,10 +572,10 @@ def _turned(seen: Seen, course: Course) -> Iterator[_Try]:
         body = nearest_rotation((course.rotation.transpose(0, 2, 1) @ rotations).mean(axis=0))
         plain = replace(seen.said, up="z")
         if seen.said.up == "z":
-            text = _angle(space)
-            yield _Try("space_turned", {"angle": text}, replace(plain, space=_square(space)), drop=FITTED_DROP)
+            turned = replace(plain, space=_square(space))
+            yield "space_turned", {"angle": _angle(space)}, {"columns": turned, **_FITTED}
         turned = replace(seen.said, body=_square(body.T))
-        yield _Try("body_turned", {"angle": _angle(body)}, turned, drop=FITTED_DROP)
+        yield "body_turned", {"angle": _angle(body)}, {"columns": turned, **_FITTED}
         return
 
 
@@ -664,7 +584,7 @@ def _angle(matrix: Array) -> str:
     return f"{numpy.degrees(numpy.arccos(cosine)):.6g}"
 
 
-def _scaled(seen: Seen, course: Course) -> Iterator[_Try]:
+def _scaled(seen: Seen, course: Course) -> Iterator[Row]:
     for name in ("omega", "omega_space"):
         if name not in seen.columns:
             continue
@@ -672,25 +592,24 @@ def _scaled(seen: Seen, course: Course) -> Iterator[_Try]:
         vectors = seen.said.vectors(seen.columns[name], True) if name == "omega_space" else seen.columns[name]
         size = float((true * true).sum())
         if size:
-            fitted = float((vectors * true).sum()) / size
-            yield from _near("omega_scaled", "factor", fitted, lambda value: replace(seen.said, omega=value))
+            yield from _near("omega_scaled", float((vectors * true).sum()) / size, seen.said, "omega")
 
 
-def _near(kind: str, name: str, fitted: float, reading: object) -> Iterator[_Try]:
-    """The fitted factor, rounded as far as that does no harm."""
+def _near(kind: str, fitted: float, said: Reading, name: str) -> Iterator[Row]:
+    """The fitted factor of a reading, rounded as far as that does no harm."""
     if not numpy.isfinite(fitted) or not fitted:
         return
     factor = named(fitted, 1e-9 * abs(fitted))
     if factor and notable(factor, Fraction(1)):
-        made = reading(float(factor))  # type: ignore[operator]
-        yield _Try(kind, {name: decimal_text(factor, 8)}, made, drop=FITTED_DROP)
+        changes: dict[str, Any] = {name: float(factor)}
+        yield kind, {"factor": decimal_text(factor, 8)}, {"columns": replace(said, **changes), **_FITTED}
 
 
 def _list(values: Array) -> str:
     return ", ".join(decimal_text(named(float(v), 1e-9 * max(1e-3, float(numpy.abs(values).max()))), 8) for v in values)
 
 
-def _pairs(seen: Seen) -> Iterator[_Try]:
+def _pairs(seen: Seen) -> Iterator[Row]:
     """Two readings at once."""
     singles = [reading for reading in _readings(seen) if reading[0] != "extrinsic"] + list(_axes_of_space(seen))
     for i, (kind, numbers, one) in enumerate(singles):

@@ -7,37 +7,35 @@ decades with it, by three where a number was fitted to the states; otherwise not
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
-from functools import cache
-from itertools import chain
 from sys import float_info
 
 import numpy
 
 from heavytop.features.score.diagnose import hypotheses
-from heavytop.features.score.diagnose.conventions import AS_LIKELY, Suppositions
+from heavytop.features.score.diagnose.conventions import Suppositions
 from heavytop.features.score.diagnose.readings import Seen, of_states
 from heavytop.features.score.diagnose.samples import (
-    ALIKE,
     AS_AT_START,
-    DROP,
-    FIRST,
-    FITTED_DROP,
-    FLOOR,
-    LIKELY_DROP,
     MOST_AT_ONCE,
     VARIES,
     WITH_ATTITUDE,
+    Examined,
+    FileAxes,
+    examined,
+    in_units,
+)
+from heavytop.features.score.diagnose.search import (
+    FIRST,
+    LIKELY_DROP,
     WORTH_ASKING,
     Array,
     Diagnosis,
-    Examined,
-    FileAxes,
     Hypothesis,
-    examined,
-    in_units,
+    Search,
     rounded,
+    scope,
 )
 from heavytop.measure.scalar import EXPLAINS, LEAST, Rounding, roundings
 from heavytop.precision import Precision, decimal_text
@@ -108,41 +106,35 @@ def diagnose(
         if mistake is None:
             if seen is None and system in WITH_ATTITUDE:
                 seen = of_states(top, start, times, states)
-            of_columns = None if seen is None else Suppositions(seen, step)
-            mistake = _explanation(
-                samples if samples is not None and samples.rows else None, of_columns, frame is not None
-            )
+            samples = samples if samples is not None and samples.rows else None
+            searches: list[Search] = [] if samples is None else [OfStates(samples)]
+            if seen is not None:
+                searches.insert(0 if frame else len(searches), Suppositions(seen, step))
+            mistake = _explanation(searches, samples)
     return [mistake] if mistake else []
 
 
-def _explanation(examined: Examined | None, columns: Suppositions | None, columns_first: bool) -> Diagnosis | None:
-    """The explanation of the states, from their motion or from the columns, over all samples or the first ones."""
+def _explanation(searches: Sequence[Search], examined: Examined | None) -> Diagnosis | None:
+    """The explanation of the states, by the first search that has one, over all samples or the first ones."""
 
-    @cache
-    def on_samples(first: int | None) -> _Tried:
-        assert examined is not None
-        return _tried(examined, first)
+    def sure(first: int | None = None) -> Diagnosis | None:
+        return next((told for search in searches if (told := search.sure(first)) is not None), None)
 
-    def told(first: int | None = None, drop: float = 0.0) -> Diagnosis | None:
-        of_columns = (suppositions.sure(first, drop) for suppositions in [columns] if suppositions is not None)
-        of_states = (_mistake(on_samples(first), drop) for _ in [examined] if examined is not None)
-        diagnoses = chain(of_columns, of_states) if columns_first else chain(of_states, of_columns)
-        each_told = (diagnosis for diagnosis in diagnoses if diagnosis is not None)
-        if drop:  # a guess is the better one
-            return min(
-                each_told, key=lambda diagnosis: (diagnosis.left or 0.0) / (diagnosis.error or 1.0), default=None
-            )
-        return next(each_told, None)
-
-    exact = told()
+    exact = sure()
     if exact is None and examined is not None:
         every = examined.widened()
         exact = _looked_at(every, _lost_row(every))
-    exact = exact or next((sure for first in FIRST if (sure := told(first)) is not None), None)
-    if exact is None and columns is not None:
-        exact = columns.of_rates() or columns.of_start()
-    likely = None if exact else next((one for n in (None, *FIRST) if (one := told(n, LIKELY_DROP)) is not None), None)
-    return exact or likely or (None if examined is None else _looked_at(examined, _integrals_off(examined)))
+    exact = exact or sure(FIRST[0]) or sure(FIRST[1])
+    for columns in searches:
+        if isinstance(columns, Suppositions):
+            exact = exact or columns.of_rates() or columns.of_start()
+    if exact is not None:
+        return exact
+    for first in (None, *FIRST):
+        guesses = [told for search in searches if (told := search.sure(first, LIKELY_DROP)) is not None]
+        if guesses:
+            return min(guesses, key=lambda told: (told.left or 0.0) / (told.error or 1.0))
+    return None if examined is None else _looked_at(examined, _integrals_off(examined))
 
 
 def _only_rounded(written: Rounding, error: float | None, examined: Examined | None) -> bool:
@@ -157,44 +149,38 @@ def _only_rounded(written: Rounding, error: float | None, examined: Examined | N
     return bool((numpy.abs(examined.states - truth) <= allowed).all())
 
 
-@dataclass(frozen=True, slots=True)
-class _Tried:
-    """Hypotheses tried on some of the samples.  error: of the motion as given.  fitted: with fitted numbers too."""
+class OfStates(Search):
+    """Hypotheses about the motion, its data and its equations."""
 
-    given: Examined
-    truth: Array | None
-    error: float
-    hypotheses: list[Hypothesis]
-    fitted: bool
+    def __init__(self, examined: Examined) -> None:
+        self.truth = examined.supposed(examined.times)
+        self.own = examined.errors(self.truth)
+        self.examined = examined.refusing(float(self.own.max()))
+        self.times, self.states = examined.given_times, len(examined.all_times)
 
+    def hypotheses(self) -> Iterator[Hypothesis]:
+        """The simplest first, those with a fitted number last."""
+        examined, truth = self.examined, self.truth
+        single, several = ([], []) if truth is None else hypotheses.readings(examined, truth)
+        yield from single
+        yield from hypotheses.without_numbers(examined)
+        yield from hypotheses.clock(examined)
+        yield from several
+        if truth is not None:
+            yield from hypotheses.scaled(examined, truth)
+        for fitted in (
+            hypotheses.fitted_clock,
+            hypotheses.all_scaled,
+            hypotheses.another_weight,
+            hypotheses.another_start,
+            hypotheses.another_top,
+        ):
+            yield from fitted(examined)
 
-def _tried(examined: Examined, first: int | None) -> _Tried:
-    """All suppositions, or on the first samples those without a fitted number."""
-    examined = examined if first is None else examined.at(examined.rows[: first + (not examined.times[0])])
-    truth = examined.supposed(examined.times)
-    error = _TOO_FAR if truth is None else examined.error(truth)
-    examined = examined.refusing(error)
-    tried = [*_hypotheses(examined, truth, first is None)] if error > WORTH_ASKING else []
-    return _Tried(examined, truth, error, tried, first is None)
-
-
-def _mistake(tried: _Tried, drop: float) -> Diagnosis | None:
-    """The simplest mistake among those that explain the states about as well as the best.
-
-    drop: a smaller one than usual, of suppositions without a fitted number.
-    """
-    examined, error = tried.given, tried.error
-    explained = [hypothesis for hypothesis in tried.hypotheses if hypothesis.left * (drop or hypothesis.drop) <= error]
-    explained = [hypothesis for hypothesis in explained if hypothesis.drop == DROP or not drop]
-    # a sign in the equations of a symmetric body is another top as well
-    if all(hypothesis.kind == "top" for hypothesis in explained) and error > _WRONG and tried.fitted and not drop:
-        others = hypotheses.of_equations(examined, tried.truth)
-        explained = [hypothesis for hypothesis in others if hypothesis.left * FITTED_DROP <= error] + explained
-    if not explained:
-        return None
-    best = min(max(hypothesis.left, FLOOR) for hypothesis in explained)
-    first = next(hypothesis for hypothesis in explained if hypothesis.left <= (AS_LIKELY if drop else ALIKE) * best)
-    return _looked_at(examined, Diagnosis(first.kind, first.numbers, error, first.left, likely=bool(drop)))
+    def further(self, diagnosis: Diagnosis | None, own: float) -> Iterator[Hypothesis]:
+        """Other equations; a sign in those of a symmetric body is another top as well."""
+        if (diagnosis is None or diagnosis.kind == "top") and own > _WRONG and self.truth is not None:
+            yield from hypotheses.of_equations(self.examined, self.truth)
 
 
 def _reset(examined: Examined | None) -> Diagnosis | None:
@@ -224,7 +210,8 @@ def _reset(examined: Examined | None) -> Diagnosis | None:
         again = every.at([every.rows[n] for n in rows])
         moved = again.supposed([time - every.times[row] + Fraction(grid[nearest]) for time in again.times])
         jumps = expected is not None and _apart(every, every.states[row], expected) > _JUMPS
-        if jumps and moved is not None and (left := again.error(moved)) * _AGAIN <= (error := float(own[rows].max())):
+        left, error = float(again.errors(moved).max()), float(own[rows].max())
+        if jumps and left * _AGAIN <= error:
             return Diagnosis("reset", {"t": in_units(times[row], every.units.time)}, error, left)
     return None
 
@@ -303,31 +290,9 @@ def _jumps(examined: Examined | None, times: Sequence[Fraction], last: int, erro
 
 def _looked_at(examined: Examined, diagnosis: Diagnosis | None) -> Diagnosis | None:
     """The diagnosis with how many of the states it was found in, where that is not all of them."""
-    looked, all_of_them = len(examined.rows), len(examined.all_times)
-    if diagnosis is None or looked == all_of_them:
-        return diagnosis
-    return replace(diagnosis, looked_at=(looked, all_of_them, in_units(examined.times[-1], examined.units.time)))
-
-
-def _hypotheses(examined: Examined, truth: Array | None, fitted: bool) -> Iterator[Hypothesis]:
-    """The simplest first, those with a fitted number last, if at all."""
-    columns, error = (None, 0.0) if truth is None else hypotheses.reading(examined, truth) or (None, 0.0)
-    if columns is not None and columns.changes == 1:
-        yield columns.leaving(error)
-    yield from hypotheses.without_numbers(examined)
-    clock = hypotheses.clock(examined, fitted)
-    if clock is not None and clock.drop == DROP:
-        yield clock
-    if columns is not None and columns.changes > 1:
-        yield columns.leaving(error)
-    if not fitted:
-        return
-    if truth is not None:
-        yield from hypotheses.scaled(examined, truth)
-    if clock is not None and clock.drop > DROP:
-        yield clock
-    fits = hypotheses.all_scaled, hypotheses.another_weight, hypotheses.another_start, hypotheses.another_top
-    yield from (hypothesis for fit in fits if (hypothesis := fit(examined)) is not None)
+    if diagnosis is None:
+        return None
+    return replace(diagnosis, looked_at=scope(examined.given_times, len(examined.all_times)))
 
 
 def _lost_row(every: Examined) -> Diagnosis | None:
@@ -359,7 +324,7 @@ def _integrals_off(examined: Examined) -> Diagnosis | None:
     if len(examined.rows) < 3 or not examined.is_whole:
         return None
     truth = examined.supposed(examined.times)
-    error = _TOO_FAR if truth is None else examined.error(truth)
+    error = _TOO_FAR if truth is None else float(examined.errors(truth).max())
     if error <= WORTH_ASKING:
         return None
     p = examined.system.parameters(examined.top, examined.start)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import lru_cache, reduce
+from functools import cache, lru_cache, reduce
 from itertools import count as serial
 from itertools import permutations, product
 from math import ceil, isfinite
@@ -21,23 +21,17 @@ import numpy
 
 from heavytop.errors import InputError
 from heavytop.features.score.diagnose.samples import (
-    ALIKE,
     FARTHEST,
-    FIRST,
-    FITTED_DROP,
-    FLOOR,
-    LIKELY_DROP,
     SHORT,
     SMALL,
     WITH_ATTITUDE,
-    Array,
     Examined,
-    Hypothesis,
     floats,
     in_units,
     named,
     notable,
 )
+from heavytop.features.score.diagnose.search import ALIKE, FIRST, FITTED_DROP, FLOOR, LIKELY_DROP, Array, Hypothesis
 from heavytop.precision import cross, decimal_text
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, NAMES, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -68,79 +62,56 @@ _MEANINGS: dict[str, tuple[float, float, bool]] = {
 """Factor of Ω, factor of γ, and whether M stands in place of Ω."""
 
 
-@dataclass(frozen=True, slots=True)
-class ColumnsHypothesis:
-    """A meaning of the six columns.
+def _readings() -> Iterator[tuple[int, str, dict[str, str], list[int], list[float]]]:
+    """Every reading of the columns but the plain one: how many things are other than they should be, kind and numbers.
 
-    meaning: a key of the table above.  axes: column i of a vector holds ±(axis |axes[i]|), counted from 1.
-    of: "both", "omega" or "gamma", the vectors whose axes these are.  swapped: γ stands before Ω.
+    Then for each column its place in Ω, γ and M of a motion, one after the other, and its factor.  Of renamed axes
+    column i of a vector holds ±(axis |axes[i]|), counted from 1, ``of`` both vectors or of one.
     """
-
-    meaning: str = ""
-    axes: tuple[int, int, int] = (1, 2, 3)
-    of: str = "both"
-    swapped: bool = False
-
-    @property
-    def changes(self) -> int:
-        """How many things are other than they should be."""
-        moved = self.axes != (1, 2, 3)
-        signs = sum(axis < 0 for axis in self.axes)
-        return bool(self.meaning) + ("_gamma_down" in self.meaning) + self.swapped + moved + signs + (self.of != "both")
-
-    def columns(self, states: Array, tensor: Array) -> Array:
-        """The columns that a file with this reading has where the states are ``states``."""
-        omega_factor, gamma_factor, momentum = _MEANINGS[self.meaning]
-        order, signs = [abs(axis) - 1 for axis in self.axes], numpy.sign(self.axes)
-        omega, gamma = states[:, :3] * omega_factor, states[:, 3:] * gamma_factor
-        omega = omega @ tensor if momentum else omega
-        if self.of != "gamma":
-            omega = omega[:, order] * signs
-        if self.of != "omega":
-            gamma = gamma[:, order] * signs
-        return numpy.hstack([gamma, omega] if self.swapped else [omega, gamma])
-
-    def leaving(self, left: float) -> Hypothesis:
-        """The mistake that such columns are."""
-        numbers = {"meaning": self.meaning} if self.meaning else {}
-        if self.axes != (1, 2, 3):
-            numbers |= {"axes": ",".join(map(str, self.axes)), "of": self.of}
-        if self.swapped:
-            numbers["order"] = "gamma before omega"
-        if len(numbers) == 1 and (self.meaning or self.swapped):
-            return Hypothesis(self.meaning or "columns_swapped", {}, left)
-        return Hypothesis("columns" if self.meaning or self.swapped else "axes_permuted", numbers, left)
-
-
-def _readings() -> Iterator[ColumnsHypothesis]:
-    renamed = [(a, b, c) for a, b, c in permutations((1, 2, 3))]
-    signed = [
-        (a * s, b * t, c * u) for a, b, c in renamed for s, t, u in product((1, -1), repeat=3) if (s, t, u) != (-1,) * 3
+    plain, renamed = (1, 2, 3), list(permutations((1, 2, 3)))
+    signs = [sign for sign in product((1, -1), repeat=3) if sign != (-1, -1, -1)]
+    kinds: list[tuple[str, tuple[int, ...]]] = [
+        ("both", (a * s, b * t, c * u)) for (a, b, c), (s, t, u) in product(renamed, signs)
     ]
-    kinds = [("both", axes) for axes in signed]
     kinds += [(of, axes) for of in ("omega", "gamma") for axes in renamed[1:]]
-    for meaning, swapped, (of, axes) in product(_MEANINGS, (False, True), kinds):
-        yield ColumnsHypothesis(meaning, axes, of, swapped)
+    for (meaning, (omega, gamma, momentum)), swapped, (of, axes) in product(_MEANINGS.items(), (False, True), kinds):
+        moved, reversed_axes = axes != plain, sum(axis < 0 for axis in axes)
+        changes = bool(meaning) + ("_gamma_down" in meaning) + swapped + moved + reversed_axes + (of != "both")
+        numbers = {"meaning": meaning} if meaning else {}
+        numbers |= {"axes": ",".join(map(str, axes)), "of": of} if moved else {}
+        numbers |= {"order": "gamma before omega"} if swapped else {}
+        kind = "columns" if meaning or swapped else "axes_permuted"
+        if len(numbers) == 1 and not moved:
+            kind, numbers = meaning or "columns_swapped", {}
+        columns = [
+            (first + abs(axis) - 1, factor * (axis // abs(axis)))
+            for first, factor, other in ((6 * momentum, omega, "gamma"), (3, gamma, "omega"))
+            for axis in (plain if of == other else axes)
+        ]
+        columns = columns[3:] + columns[:3] if swapped else columns
+        if changes:
+            yield changes, kind, numbers, [place for place, _ in columns], [factor for _, factor in columns]
 
 
-READINGS = sorted((reading for reading in _readings() if reading.changes), key=lambda reading: reading.changes)
-"""Every reading that is tried, the simplest first."""
+@cache
+def _every_reading() -> tuple[tuple[Any, ...], ...]:
+    """Changes, kinds, numbers, places and factors of every reading, the simplest first."""
+    return tuple(zip(*sorted(_readings(), key=lambda reading: reading[0]), strict=True))
 
 
-def reading(run: Examined, truth: Array) -> tuple[ColumnsHypothesis, float] | None:
-    """The simplest reading of the columns that fits about as well as the best, and its error."""
+def readings(run: Examined, truth: Array) -> tuple[list[Hypothesis], list[Hypothesis]]:
+    """The readings of the columns with one change, and those with several, the simplest first."""
     if len(run.frame.columns) < 6:
-        return None
-    errors = [run.error(reading.columns(truth[:, :6], run.tensor)) for reading in READINGS]
-    best = min(errors)
-    return next(
-        (
-            (reading, error)
-            for reading, error in zip(READINGS, errors, strict=True)
-            if error <= ALIKE * max(best, FLOOR)
-        ),
-        None,
-    )
+        return [], []
+    changes, kinds, numbers, places, factors = _every_reading()
+    time, inertia = float(run.units.time), float(run.units.inertia)
+    columns = numpy.hstack([truth[:, :6], inertia * truth[:, :3] @ run.tensor])
+    place, factor = numpy.array(places), numpy.array(factors)
+    # a vector in the place of the other is in the unit of that
+    factor[place[:, 0] // 3 == 1] *= numpy.repeat([time, 1 / time], 3)
+    errors = run.errors((columns[:, place] * factor).swapaxes(0, 1))
+    tried = list(map(Hypothesis, kinds, numbers, errors))
+    return tried[: changes.count(1)], tried[changes.count(1) :]
 
 
 def scaled(run: Examined, truth: Array) -> Iterator[Hypothesis]:
@@ -156,7 +127,7 @@ def scaled(run: Examined, truth: Array) -> Iterator[Hypothesis]:
         fitted = float((run.states[:, columns] * true).sum() / (true * true).sum())
         if not numpy.isfinite(fitted) or not fitted:
             continue
-        left = _divided(run, truth, columns, fitted)
+        left = float(_divided(run, truth, columns, fitted).max())
         factor = named(fitted, ALIKE * max(left, FLOOR) * abs(fitted))
         if factor and (factor != -1 or true.shape[1] == 1) and notable(factor, Fraction(1)):
             numbers = {"column": NAMES[columns.start]} if kind == "column_scaled" else {}
@@ -164,10 +135,10 @@ def scaled(run: Examined, truth: Array) -> Iterator[Hypothesis]:
             yield Hypothesis(kind, numbers, _divided(run, truth, columns, float(factor)), FITTED_DROP)
 
 
-def _divided(run: Examined, truth: Array, columns: slice, factor: float) -> float:
+def _divided(run: Examined, truth: Array, columns: slice, factor: float) -> Array:
     states = run.states.copy()
     states[:, columns] /= factor
-    return replace(run, states=states).error(truth)
+    return replace(run, states=states).errors(truth)
 
 
 def constant_column(run: Examined, truth: Array) -> Iterator[Hypothesis]:
@@ -180,7 +151,7 @@ def constant_column(run: Examined, truth: Array) -> Iterator[Hypothesis]:
         states[:, column] = truth[:, column]
         value = Fraction(float(run.states[0, column])) / (run.units.time if column < 3 else 1)
         numbers = {"column": NAMES[column], "value": decimal_text(value, 6)}
-        yield Hypothesis("column_constant", numbers, replace(run, states=states).error(truth), FITTED_DROP)
+        yield Hypothesis("column_constant", numbers, replace(run, states=states).errors(truth), FITTED_DROP)
 
 
 _SINGULAR = 1e-4
@@ -201,27 +172,33 @@ _LATER = 2
 
 def without_numbers(run: Examined) -> Iterator[Hypothesis]:
     """Mistakes of the data that need no fitted number, the likeliest first."""
-    top, start = run.top, run.start
-    if top.weight:
-        yield _tried(run, "no_gravity", replace(top, weight=Fraction(0)))
-    yield _tried(run, "weight_sign", replace(top, weight=-top.weight))
-    yield _tried(run, "start_gamma_sign", start=State(start.omega, [-g for g in start.gamma]))
-    yield _tried(run, "start_omega_sign", start=State([-w for w in start.omega], start.gamma))
+    top, (omega, gamma) = run.top, (run.start.omega, run.start.gamma)
     k = top.rotor or (Fraction(0),) * 3
-    momentum = State([(w - r) / i for w, i, r in zip(start.omega, top.inertia, k, strict=True)], start.gamma)
-    yield _tried(run, "start_momentum", start=momentum)
+    momentum = State([(w - r) / i for w, i, r in zip(omega, top.inertia, k, strict=True)], gamma)
+    for kind, other in (
+        ("no_gravity", {"top": replace(top, weight=Fraction(0))}),
+        ("weight_sign", {"top": replace(top, weight=-top.weight)}),
+        ("start_gamma_sign", {"start": State(omega, [-g for g in gamma])}),
+        ("start_omega_sign", {"start": State([-w for w in omega], gamma)}),
+        ("start_momentum", {"start": momentum}),
+    ):
+        supposed = replace(run, **other)
+        if (supposed.top.moment, supposed.start) != (top.moment, run.start):
+            yield Hypothesis(kind, {}, supposed.beside())
     yield Hypothesis("all_momentum", {}, _restated(run, momentum, lambda omega: omega @ run.tensor + run.in_file(k)))
     for unit, factor in UNITS_OF_OMEGA.items():
         yield Hypothesis(f"all_in_{unit}", {}, _all_times(run, factor))
-    other = GYROSTAT if run.system is HEAVY_TOP else HEAVY_TOP
-    yield _tried(replace(run, system=other), "system", None if top.rotor is None else replace(top, rotor=None))
-    if top.rotor is not None:
-        yield _tried(run, "rotor_sign", HeavyTop(top.inertia, top.weight, top.centre, [-part for part in top.rotor]))
+    without = top if top.rotor is None else replace(top, rotor=None)
+    other_system = GYROSTAT if run.system is HEAVY_TOP else HEAVY_TOP
+    yield Hypothesis("system", {}, replace(run, system=other_system, top=without).beside())
+    if any(k):
+        turned = HeavyTop(top.inertia, top.weight, top.centre, [-part for part in k])
+        yield Hypothesis("rotor_sign", {}, replace(run, top=turned).beside())
     own = run.tensor, run.in_file(top.centre), run.in_file(k)
     for kind, numbers, *body in other_axes(*own):
         if not all(map(numpy.array_equal, body, own)):
             supposed = run.with_body(body[0], float(top.weight) * body[1], body[2])
-            yield Hypothesis(kind, numbers, supposed.left())
+            yield Hypothesis(kind, numbers, supposed.beside())
 
 
 def other_axes(tensor: Array, centre: Array, rotor: Array) -> Iterator[tuple[str, dict[str, str], Array, Array, Array]]:
@@ -237,38 +214,29 @@ def other_axes(tensor: Array, centre: Array, rotor: Array) -> Iterator[tuple[str
         yield "centre_signs", {"centre": ", ".join(texts)}, tensor, centre * signs, rotor
 
 
-def _tried(run: Examined, kind: str, top: HeavyTop | None = None, start: State | None = None) -> Hypothesis:
-    tops = (top or run.top, run.top)
-    same = all(getattr(tops[0], part) == getattr(tops[1], part) for part in ("moment", "rotor"))
-    if same and (start is None or start == run.start) and kind != "system":
-        return Hypothesis(kind, {}, float("inf"))
-    return Hypothesis(kind, {}, run.left(top, start))
-
-
-def _restated(run: Examined, start: State, omega: Callable[[Array], Array]) -> float:
+def _restated(run: Examined, start: State, omega: Callable[[Array], Array]) -> Array:
     """The error where the start is another, and the states give something else in place of Ω."""
-    truth = run.supposed(run.times, start=start)
-    return run.error(None if truth is None else numpy.hstack([omega(truth[:, :3]), truth[:, 3:]]))
+    truth = replace(run, start=start).supposed(run.times)
+    return run.errors(None if truth is None else numpy.hstack([omega(truth[:, :3]), truth[:, 3:]]))
 
 
-def _all_times(run: Examined, factor: float) -> float:
+def _all_times(run: Examined, factor: float) -> Array:
     """The error where start and states give Ω times ``factor``."""
     start = State([w / Fraction(factor) for w in run.start.omega], run.start.gamma)
     return _restated(run, start, lambda omega: omega * factor)
 
 
-def all_scaled(run: Examined) -> Hypothesis | None:
+def all_scaled(run: Examined) -> Iterator[Hypothesis]:
     """A constant factor of Ω in start and states: its square is that of the weight that the energy asks for."""
     square = _weight_ratio(run)
     if square is None or square <= 0:
-        return None
+        return
     fitted = square**0.5
-    left = _all_times(run, fitted)
+    left = float(_all_times(run, fitted).max())
     factor = named(fitted, _MARGIN * max(left, FLOOR) * fitted)
-    if not factor or not notable(factor, Fraction(1)):
-        return None
-    numbers = {"factor": decimal_text(factor, 8)}
-    return Hypothesis("all_scaled", numbers, _all_times(run, float(factor)), FITTED_DROP)
+    if factor and notable(factor, Fraction(1)):
+        numbers = {"factor": decimal_text(factor, 8)}
+        yield Hypothesis("all_scaled", numbers, _all_times(run, float(factor)), FITTED_DROP)
 
 
 def _weight_ratio(run: Examined) -> float | None:
@@ -284,21 +252,19 @@ def _weight_ratio(run: Examined) -> float | None:
     return ratio if isfinite(ratio) else None
 
 
-def another_weight(run: Examined) -> Hypothesis | None:
+def another_weight(run: Examined) -> Iterator[Hypothesis]:
     """P from the energy."""
     ratio, old = _weight_ratio(run), run.top.weight
     if ratio is None or not isfinite(ratio * float(old)):
-        return None
-    fitted = ratio * float(old)
-    candidates = [named(fitted, near * abs(float(old))) for near in _NEAR]
-    tops = [(weight, replace(run.top, weight=weight)) for weight in candidates]
-    weight, error = _roundest([(weight, run.left(top)) for weight, top in tops])
-    if not notable(weight, old):
-        return None
-    return Hypothesis("weight", {"P": _text(weight * run.units.moment)}, error, FITTED_DROP)
+        return
+    weights = [named(ratio * float(old), near * abs(float(old))) for near in _NEAR]
+    tops = [(other, replace(run.top, weight=other)) for other in weights]
+    weight, errors = _roundest([(other, replace(run, top=top).beside()) for other, top in tops])
+    if notable(weight, old):
+        yield Hypothesis("weight", {"P": _text(weight * run.units.moment)}, errors, FITTED_DROP)
 
 
-def another_start(run: Examined) -> Hypothesis | None:
+def another_start(run: Examined) -> Iterator[Hypothesis]:
     """The start from the first sample, carried back to t = 0, and checked on samples that are much later.
 
     The error must fall by more than the motion itself magnifies it from the start to the first sample: where
@@ -306,28 +272,27 @@ def another_start(run: Examined) -> Hypothesis | None:
     """
     times = run.times
     if len(times) < 3 or not times[0] or abs(times[-1]) < _LATER * abs(times[0]) or numpy.isnan(run.states[0]).any():
-        return None
+        return
     back = run.starting(run.states[0]).supposed([-times[0]])
     truth = run.supposed(times[:1])
     if back is None or truth is None or not _shows_at_once(run, truth):
-        return None
+        return
     start = run.in_file(run.start.flat)
-    error = run.starting(back[0]).left()
+    errors = run.starting(back[0]).beside()
     off = numpy.abs(back[0, :6] - start)
     magnified = float(numpy.abs(run.states[0] - truth[0]).max() / (off.max() or 1.0))
     sizes = [max(run.rate, numpy.abs(back[0, :3]).max())] * 3 + [1.0] * 3
     units = [run.units.time] * 3 + [Fraction(1)] * 3
-    noise = _MARGIN * max(error, 1e-12)
+    noise = _MARGIN * max(float(errors.max()), 1e-12)
     changed = [
         (name, named(float(value), noise * size), unit, change > _BIAS * size, noise * size)
         for name, value, change, size, unit in zip(NAMES, back[0], off, sizes, units, strict=False)
         if change > noise * size
     ]
     # a method of low order carries an error of its first step along as another start
-    if not any(large or _is_round(new, near) for _, new, _, large, near in changed):
-        return None
-    numbers = {name: _text(new / unit) for name, new, unit, *_ in changed}
-    return Hypothesis("start", numbers, error, FITTED_DROP * max(1.0, magnified))
+    if any(large or _is_round(new, near) for _, new, _, large, near in changed):
+        numbers = {name: _text(new / unit) for name, new, unit, *_ in changed}
+        yield Hypothesis("start", numbers, errors, FITTED_DROP * max(1.0, magnified))
 
 
 def _is_round(new: Fraction, near: float) -> bool:
@@ -339,28 +304,27 @@ def _shows_at_once(run: Examined, first: Array) -> bool:
     """Whether the first sample is off by a notable part of the largest error: a motion that magnifies the errors of a
     method may look like one from another start.
     """
-    early, largest = run.at(run.rows[:1]).error(first), run.error(run.supposed(run.times))
-    return early >= _AT_ONCE * largest
+    early, errors = run.at(run.rows[:1]).errors(first), run.errors(run.supposed(run.times))
+    return bool(early.max() >= _AT_ONCE * errors.max())
 
 
-def another_top(run: Examined) -> Hypothesis | None:
+def another_top(run: Examined) -> Iterator[Hypothesis]:
     """The moments and n = P r, up to a common factor, that keep both integrals from the start to every sample."""
     entries = _PRODUCTS if _is_full(run) else _PRODUCTS[:3]
     direction = _conserving(run, entries) if run.system is HEAVY_TOP and len(run.rows) >= 3 else None
     before = [Fraction(run.tensor[entry]) for entry in entries] + [*map(Fraction, run.in_file(run.top.moment))]
     if direction is None or not (direction * floats(before)).any():
-        return None
+        return
     scaled = [_scaled(direction, before, near) for near in _NEAR]
     tried = [(numbers, _with(run, numbers[:-3], numbers[-3:])) for numbers in scaled]
-    numbers, error = _roundest(tried)
+    numbers, errors = _roundest(tried)
     units = [run.units.inertia] * len(numbers[3:]) + [run.units.moment] * 3
     names = [f"I{i + 1}{j + 1}" if _is_full(run) else f"I{i + 1}" for i, j in entries] + ["P a", "P b", "P c"]
     entries_of = zip(names, before, numbers, units, strict=True)
     changed = {name: _text(new * unit) for name, old, new, unit in entries_of if new != old}
     told = any(notable(new, old) for old, new in zip(before, numbers, strict=True) if new != old)
-    if not told or len(changed) > _MOST_CHANGED:
-        return None
-    return Hypothesis("top", changed, error, FITTED_DROP)
+    if told and len(changed) <= _MOST_CHANGED:
+        yield Hypothesis("top", changed, errors, FITTED_DROP)
 
 
 _PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -410,24 +374,24 @@ def _scaled(direction: Array, before: Sequence[Fraction], near: float) -> list[F
     ]
 
 
-def _with(run: Examined, inertia: Sequence[Fraction], moment: Sequence[Fraction]) -> float:
+def _with(run: Examined, inertia: Sequence[Fraction], moment: Sequence[Fraction]) -> Array:
     """The error with those entries of the tensor, and P r."""
     tensor = numpy.zeros((3, 3))
     for (i, j), value in zip(_PRODUCTS, floats(inertia), strict=False):
         tensor[i, j] = tensor[j, i] = value
     try:
-        return run.with_body(tensor, floats(moment)).left()
+        return run.with_body(tensor, floats(moment)).beside()
     except InputError:  # a moment that is not positive
-        return float("inf")
+        return run.errors(None)
 
 
 _Numbers = TypeVar("_Numbers")
 
 
-def _roundest(tried: Sequence[tuple[_Numbers, float]]) -> tuple[_Numbers, float]:
+def _roundest(tried: Sequence[tuple[_Numbers, Array]]) -> tuple[_Numbers, Array]:
     """The first, that is the most rounded, whose error is about as small as any."""
-    best = min(error for _, error in tried)
-    return next(pair for pair in tried if pair[1] <= ALIKE * best)
+    best = min(errors.max() for _, errors in tried)
+    return next(pair for pair in tried if pair[1].max() <= ALIKE * best)
 
 
 def _text(value: Fraction) -> str:
@@ -542,20 +506,18 @@ _SIGNS = {
 }
 
 
-def of_equations(run: Examined, truth: Array | None) -> Iterator[Hypothesis]:
+def of_equations(run: Examined, truth: Array) -> Iterator[Hypothesis]:
     """Other equations, axes and orders; one equation or one term that is wrong only where nothing else fits."""
-    if truth is None:
-        return
     hypotheses = [*constant_column(run, truth)]
     if len(run.frame.columns) == 6:
-        hypotheses += [_any_order(run, truth), *_axes_of_space(run, truth)]
-    error, early = run.error(truth), run.at(run.rows[: FIRST[0]]).error(truth[: FIRST[0]])
-    if run.system not in WITH_ATTITUDE:
-        yield from hypotheses
-        return
-    hypotheses += [_of_field(run, early, kind, {}, changes) for kind, changes in _SIGNS.items()]
+        hypotheses += [*_any_order(run, truth), *_axes_of_space(run, truth)]
+    errors = run.errors(truth)
+    error, early = float(errors.max()), float(errors[: FIRST[0]].max())
+    if run.system in WITH_ATTITUDE:
+        hypotheses += [_of_field(run, early, kind, {}, changes) for kind, changes in _SIGNS.items()]
     yield from hypotheses
-    if error > _ANOTHER_MOTION and all(hypothesis.left * FITTED_DROP > error for hypothesis in hypotheses):
+    nothing = all(hypothesis.left() * FITTED_DROP > error for hypothesis in hypotheses)
+    if run.system in WITH_ATTITUDE and error > _ANOTHER_MOTION and nothing:
         yield from _terms(run, early)
 
 
@@ -584,8 +546,8 @@ def _of_field(
     rotor = run.system.parameters(run.top, run.start).mapped(float).rotor
     axes = tuple(map(tuple, run.frame.axes.tolist()))
     other = replace(run, system=_altered(run.system, rotor, axes, changes, factor))
-    left = other.left() if _begins_so(other, max(early / LIKELY_DROP, _OF_STEPS)) else float("inf")
-    return Hypothesis(kind, numbers, left, FITTED_DROP)
+    begins = _begins_so(other, max(early / LIKELY_DROP, _OF_STEPS))
+    return Hypothesis(kind, numbers, other.beside() if begins else run.errors(None), FITTED_DROP)
 
 
 def _begins_so(given: Examined, allowed: float) -> bool:
@@ -608,7 +570,7 @@ def _begins_so(given: Examined, allowed: float) -> bool:
             c = rates(y + h / 2 * b)
             y = y + h / 6 * (a + 2 * b + 2 * c + rates(y + h * c))
         time = end
-        if not sample.error((y.reshape(-1, 2, 3) @ given.frame.axes.T).reshape(-1, 6)) <= allowed:
+        if not sample.errors((y.reshape(-1, 2, 3) @ given.frame.axes.T).reshape(-1, 6)).max() <= allowed:
             return False
     return True
 
@@ -617,30 +579,27 @@ def _axes_of_space(run: Examined, truth: Array) -> Iterator[Hypothesis]:
     """Ω, or Ω and γ, in axes fixed in space, one of which is vertical: |Ω| and the vertical part Ω·γ tell."""
     omega, gamma, truth = run.states[:, :3], run.states[:, 3:6], truth[:, :6]
     size = max(numpy.abs(truth[:, :3]).max(), 1e-3 * run.rate)
-    length = numpy.abs(numpy.linalg.norm(omega, axis=1) - numpy.linalg.norm(truth[:, :3], axis=1)).max() / size
+    length = numpy.abs(numpy.linalg.norm(omega, axis=1) - numpy.linalg.norm(truth[:, :3], axis=1)) / size
     vertical = (truth[:, :3] * truth[:, 3:]).sum(axis=1)
     for axis in range(3):
         up = numpy.eye(3)[axis]
-        part = numpy.abs(omega[:, axis] - vertical).max() / size
+        part = numpy.abs(omega[:, axis] - vertical) / size
         for what, expected in (("omega", truth[:, 3:]), ("both", up)):
-            left = max(length, part, numpy.abs(gamma - expected).max())
+            errors = numpy.maximum.reduce([length, part, numpy.abs(gamma - expected).max(axis=1)])
             numbers = {"of": what, "vertical": str(axis + 1)}
-            yield Hypothesis("axes_of_space", numbers, float(left), FITTED_DROP)
+            yield Hypothesis("axes_of_space", numbers, errors, FITTED_DROP)
 
 
-def _any_order(run: Examined, truth: Array) -> Hypothesis:
+def _any_order(run: Examined, truth: Array) -> Iterator[Hypothesis]:
     """Each column as that component, or its negative, that it is nearest to."""
     truth = truth[:, :6]
     sizes = numpy.repeat([max(numpy.abs(truth[:, :3]).max(), 1e-3 * run.rate), numpy.abs(truth[:, 3:]).max()], 3)
     both = numpy.hstack([truth, -truth]) / numpy.tile(sizes, 2)
-    off = numpy.array(
-        [numpy.abs(column[:, None] / numpy.tile(sizes, 2) - both).max(axis=0) for column in run.states[:, :6].T]
-    )
-    nearest = off.argmin(axis=1)
-    if sorted(nearest % 6) != list(range(6)):
-        return Hypothesis("column_order", {}, float("inf"))
-    names = ", ".join(("−" if index >= 6 else "") + NAMES[index % 6] for index in nearest)
-    return Hypothesis("column_order", {"columns": names}, float(off.min(axis=1).max()), FITTED_DROP)
+    off = numpy.abs(run.states[:, :6, None] / numpy.tile(sizes, 2) - both[:, None, :])
+    nearest = off.max(axis=0).argmin(axis=1)
+    if sorted(nearest % 6) == list(range(6)):
+        names = ", ".join(("−" if index >= 6 else "") + NAMES[index % 6] for index in nearest)
+        yield Hypothesis("column_order", {"columns": names}, off[:, range(6), nearest].max(axis=1), FITTED_DROP)
 
 
 # Times that mean something else: reversed, shifted, in another unit, or off by a row.
@@ -651,7 +610,7 @@ _WITHIN = 0.3
 """A place of the grid is tried if the first state is so near to it, relative to the size of the motion."""
 _TRIED = 12
 _REFINED = 6
-FALLS = 1.5
+_FALLS = 1.5
 """Factor by which the sum of squares falls while a number is refined."""
 _SPAN = Fraction(1, 10)
 """The samples must spread over so much of their time: an integrator's own lag grows with time and is not a shift."""
@@ -666,20 +625,16 @@ _FEWEST_ROWS = 3
 _CIRCLE = (2 * numpy.pi, 1 / (2 * numpy.pi), numpy.pi / 180, 180 / numpy.pi)
 
 
-def clock(run: Examined, fitted: bool) -> Hypothesis | None:
-    """The simplest of the mistakes of the times that are about as good as the best.
+def clock(run: Examined) -> Iterator[Hypothesis]:
+    """Mistakes of the times without a number that is fitted.
 
     times_shifted by s: the state said to be at t is that of t + s.  time_unit with the factor f: it is that of f·t.
     """
-    hypotheses = list(_of_rows(run))
+    yield from _of_rows(run)
     for factor in sorted(_UNITS | {Fraction(value) for value in _CIRCLE}):
         if abs(float(factor * run.times[-1])) * run.rate <= FARTHEST:
-            error = run.left(times=[factor * time for time in run.times])
-            hypotheses.append(Hypothesis("time_unit", _unit_numbers(float(factor)), error))
-    if fitted and len(run.rows) >= 3:
-        hypotheses += _fitted(run)
-    best = min(hypothesis.left for hypothesis in hypotheses)
-    return next((hypothesis for hypothesis in hypotheses if hypothesis.left <= ALIKE * max(best, FLOOR)), None)
+            errors = run.beside([factor * time for time in run.times])
+            yield Hypothesis("time_unit", _unit_numbers(float(factor)), errors)
 
 
 def _unit_numbers(factor: float) -> dict[str, str]:
@@ -690,34 +645,32 @@ def _unit_numbers(factor: float) -> dict[str, str]:
 def _of_rows(run: Examined) -> Iterator[Hypothesis]:
     """Rows that are those of other times."""
     every = run.all_times
-    tried = [("time_reversed", run, [-time for time in run.times])]
-    if len(every) > 1:
-        tried.append(("start_row_missing", run, [every[row - 1] if row else Fraction(0) for row in run.rows]))
-        tried.append(("rows_reversed", run, [every[-1 - row] for row in run.rows]))
-        tried.append(("rows_off_by_one", *_neighbours(run, 1, 2 * every[-1] - every[-2])))
-        tried.append(("rows_late", *_neighbours(run, -1, 2 * every[0] - every[1])))
-    yield from (Hypothesis(kind, {}, at.left(times=times)) for kind, at, times in tried)
+    yield Hypothesis("time_reversed", {}, run.beside([-time for time in run.times]))
+    if len(every) == 1:
+        return
+    late = [every[row - 1] if row else Fraction(0) for row in run.rows]
+    yield Hypothesis("start_row_missing", {}, run.beside(late))
+    yield Hypothesis("rows_reversed", {}, run.beside([every[-1 - row] for row in run.rows]))
+    yield from _neighbours(run, "rows_off_by_one", (*every[1:], 2 * every[-1] - every[-2]))
+    yield from _neighbours(run, "rows_late", (2 * every[0] - every[1], *every[:-1]))
 
 
-def _neighbours(run: Examined, off: int, beyond: Fraction) -> tuple[Examined, list[Fraction]]:
-    """The states of the samples ``off`` rows on; a row at an end has no such sample, and is left out where enough are
-    left that are about as wrong as all: else it is that at ``beyond``.
+def _neighbours(run: Examined, kind: str, times: Sequence[Fraction]) -> Iterator[Hypothesis]:
+    """The states of other ``times``; also without the row at an end that has a time of no sample, where enough are left
+    that are about as wrong as all.
     """
-    inside = range(len(run.all_times))
-    rows = [row for row in run.rows if row + off in inside]
-    at = run
-    if _FEWEST_ROWS <= len(rows) < len(run.rows):
-        fewer = run.at(rows)
-        wrong, wrong_of_all = (samples.error(samples.supposed(samples.times)) for samples in (fewer, run))
-        at = fewer if ALIKE * wrong >= wrong_of_all else run
-    times = [run.all_times[row + off] if row + off in inside else beyond for row in at.rows]
-    return at, times
+    yield Hypothesis(kind, {}, run.beside([times[row] for row in run.rows]))
+    fewer = run.at([row for row in run.rows if times[row] in run.all_times])
+    if _FEWEST_ROWS <= len(fewer.rows) < len(run.rows):
+        wrong, wrong_of_all = (samples.errors(samples.supposed(samples.times)).max() for samples in (fewer, run))
+        if ALIKE * wrong >= wrong_of_all:
+            yield Hypothesis(kind, {}, fewer.beside([times[row] for row in fewer.rows]))
 
 
-def _fitted(run: Examined) -> Iterator[Hypothesis]:
+def fitted_clock(run: Examined) -> Iterator[Hypothesis]:
     """Shifts and units that bring the first states onto the motion, refined over all samples."""
     times = numpy.array([float(time) for time in run.times])
-    if abs(times[-1] - times[0]) < _SPAN * abs(times[0]):
+    if len(times) < 3 or abs(times[-1] - times[0]) < _SPAN * abs(times[0]):
         return
     reach = min(1.5 * abs(times[-1]) + 6 / run.rate, FARTHEST / run.rate)
     grid = numpy.linspace(-reach, reach, _GRID)
@@ -727,10 +680,10 @@ def _fitted(run: Examined) -> Iterator[Hypothesis]:
     sizes = numpy.array([max(orbit[:, :3].max(), -orbit[:, :3].min()) or 1.0] * 3 + [1.0] * (orbit.shape[1] - 3))
     # a method's own lag explains the samples of an oscillation as well as any clock
     slower = list(_refined(run, "time_unit", 1.0, times, sizes))
-    lag = min((error for factor, error in slower if abs(factor - 1) < _NEAR_ONE), default=float("inf"))
-    for factor, error in slower:
+    lag = min((errors.max() for factor, errors in slower if abs(factor - 1) < _NEAR_ONE), default=numpy.inf)
+    for factor, errors in slower:
         if abs(factor - 1) >= _NEAR_ONE or _is_short(factor):
-            yield Hypothesis("time_unit", _unit_numbers(factor), error, FITTED_DROP)
+            yield Hypothesis("time_unit", _unit_numbers(factor), errors, FITTED_DROP)
     for kind in ("times_shifted", "time_unit"):
         # a shift is the same for every sample, and of a periodic motion the smallest; a unit shows best at the earliest
         # sample away from 0
@@ -741,12 +694,12 @@ def _fitted(run: Examined) -> Iterator[Hypothesis]:
             off = numpy.abs(orbit[numpy.rint(supposed).astype(int)] - run.states) / sizes
             tried.append((float(numpy.median(numpy.fmax.reduce(off, axis=1))), number))
         for _, first in sorted(tried)[: _TRIED // 3]:
-            for number, error in _refined(run, kind, first, times, sizes):
+            for number, errors in _refined(run, kind, first, times, sizes):
                 near_one = kind == "time_unit" and abs(number - 1) < _NEAR_ONE
-                if _is_short(number) if near_one else ALIKE * error < lag:
+                if _is_short(number) if near_one else ALIKE * errors.max() < lag:
                     shift = {"shift": in_units(number, run.units.time)}
                     numbers = _unit_numbers(number) if kind == "time_unit" else shift
-                    yield Hypothesis(kind, numbers, error, FITTED_DROP)
+                    yield Hypothesis(kind, numbers, errors, FITTED_DROP)
 
 
 def _steps_of_interval(factor: float) -> int | None:
@@ -778,23 +731,35 @@ def _moved(kind: str, number: float, times: Array) -> Array:
     return times + number if kind == "times_shifted" else times * number
 
 
-def _refined(run: Examined, kind: str, number: float, times: Array, sizes: Array) -> Iterator[tuple[float, float]]:
-    """The number by Gauss-Newton, with its error; the rate of the motion is a difference quotient of the motion."""
-    small, count, before = 1e-6 / run.rate, len(times), numpy.inf
-    for _ in range(_REFINED):
-        at = _moved(kind, number, times)
-        both = run.supposed([*map(Fraction, at), *map(Fraction, at + small)])
-        if both is None:
-            return
-        here, slope = both[:count], (both[count:] - both[:count]) / small / sizes
-        off = (run.states - here) / sizes
-        if not FALLS * (size := float(numpy.nansum(off * off))) < before:
+def _refined(run: Examined, kind: str, number: float, times: Array, sizes: Array) -> Iterator[tuple[float, Array]]:
+    """The number that fits best, with the errors that it leaves; none where the motion is not known there."""
+
+    def off(x: Array) -> Array:
+        at = _moved(kind, x[0], times)
+        known = run.supposed([*map(Fraction, at)]) if numpy.isfinite(at).all() else None
+        return numpy.full(1, numpy.inf) if known is None else numpy.nan_to_num((known - run.states) / sizes).reshape(-1)
+
+    small = 1e-6 / run.rate / (1.0 if kind == "times_shifted" else abs(times).max())
+    x, here = gauss_newton(off, numpy.array([number]), small, _REFINED)
+    if numpy.isfinite(here).all():
+        yield float(x[0]), run.beside([Fraction(value) for value in _moved(kind, x[0], times)])
+
+
+def gauss_newton(off: Callable[[Array], Array], x: Array, slight: float, most: int) -> tuple[Array, Array]:
+    """Numbers and residuals ``off``, as far as each of so many steps makes their sum of squares smaller.
+
+    slight: of a number, in a difference quotient.
+    """
+    here = off(x)
+    for _ in range(most):
+        slopes = [(off(x + slight * unit) - here) / slight for unit in numpy.eye(len(x))]
+        if not all(numpy.isfinite(part).all() for part in (here, *slopes)):
+            break
+        after = x - numpy.linalg.lstsq(numpy.stack(slopes, axis=1), here, rcond=None)[0]
+        there = off(after)
+        if not float(there @ there) < float(here @ here):
+            break
+        falls, x, here = float(here @ here) > _FALLS * float(there @ there), after, there
+        if not falls:
             break  # at the least of it
-        slope, before = slope * (1.0 if kind == "times_shifted" else times[:, None]), size
-        square = float((slope * slope)[~numpy.isnan(run.states)].sum())
-        if not square:
-            return
-        number += float(numpy.nansum(slope * off)) / square
-        if not abs(_moved(kind, number, times)).max() * run.rate <= FARTHEST:
-            return
-    yield number, run.left(times=[Fraction(value) for value in _moved(kind, number, times)])
+    return x, here

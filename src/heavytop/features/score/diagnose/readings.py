@@ -11,7 +11,8 @@ from types import SimpleNamespace
 
 import numpy
 
-from heavytop.features.score.diagnose.samples import Array, floats, motion_in_double, principal
+from heavytop.features.score.diagnose.samples import floats, motion_in_double, principal
+from heavytop.features.score.diagnose.search import Array
 from heavytop.measure.attitude_error import UPS, Convention
 from heavytop.precision import cross
 from heavytop.top.attitude import matrix_of_quaternion, quaternion_products, rows_of, rows_of_euler
@@ -197,7 +198,8 @@ class Reading:
         if self.mirror is not None:
             signs = numpy.where(numpy.arange(3) == self.mirror, -1.0, 1.0)
             rotations = rotations * signs[:, None] * signs
-        return upright(numpy.array(self.space).T @ rotations @ numpy.array(self.body), self.up)
+        columns = numpy.array(self.body).T @ rotations.transpose(0, 2, 1) @ numpy.array(self.space)
+        return upright(columns, self.up).transpose(0, 2, 1)
 
     def _plain(self, form: str, values: Array) -> Array:
         if form == "quaternion":
@@ -215,8 +217,7 @@ class Reading:
 
     def vectors(self, values: Array, axial: bool = False) -> Array:
         """Vectors of space in canonical axes, shape (n, 3)."""
-        turned: Array = self._reflected(values, axial) @ numpy.array(self.space)
-        return upright_vectors(turned, self.up)
+        return upright(self._reflected(values, axial) @ numpy.array(self.space), self.up)
 
     def body_vectors(self, values: Array, axial: bool = False) -> Array:
         """Vectors of the body in the axes said, shape (n, 3)."""
@@ -239,18 +240,11 @@ def _stacked(rows: object, count: int) -> Array:
     return stacked
 
 
-def upright(matrices: Array, up: str) -> Array:
-    """Matrices whose rows are axes of space, with canonical ones in their place."""
+def upright(vectors: Array, up: str) -> Array:
+    """Vectors of space along the last axis, in canonical axes."""
     places, signs = UPS[up]
-    rotations: Array = matrices[..., list(places), :] * numpy.array(signs, dtype=float)[:, None]
-    return rotations
-
-
-def upright_vectors(vectors: Array, up: str) -> Array:
-    """Vectors of space in canonical axes."""
-    places, signs = UPS[up]
-    upright: Array = vectors[..., list(places)] * numpy.array(signs, dtype=float)
-    return upright
+    turned: Array = vectors[..., list(places)] * numpy.array(signs, dtype=float)
+    return turned
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,26 +11,21 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache
 from math import floor
-from typing import NamedTuple
 
 import numpy
-from numpy.typing import NDArray
 
 from heavytop.errors import HeavyTopError
+from heavytop.features.score.diagnose.search import FIRST, LIKELY_DROP, Array
 from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.motions import states_at
 from heavytop.integrate.trajectory import Outcome
-from heavytop.measure.scalar import Rounding, explains
 from heavytop.precision import DOUBLE, decimal_text, dot, log10, plain_decimal
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
-Array = NDArray[numpy.float64]
 WITH_ATTITUDE = (HEAVY_TOP, HEAVY_GYROSTAT)
 """Systems whose attitude rides along."""
 
-WORTH_ASKING = 1e-10
-"""Relative errors below it are no mistake."""
 VARIES, AS_AT_START = "varies", "that of the start"
 """Words for first integrals that do not keep another value."""
 MOST_SAMPLES = 24
@@ -49,10 +44,6 @@ _TRUSTED = 1e-11
 _USUAL = 3.0
 """Decades by which a unit may be off before another is taken."""
 MOST_AT_ONCE = 2000
-ALIKE = 30.0
-"""Of suppositions whose errors differ by less, the simplest is meant."""
-FLOOR = 1e-13
-"""Relative errors below it are heyoka's own."""
 _NOTABLE = 0.02
 """A fitted number must be off by this part or be a short decimal: methods have small biases of their own."""
 SHORT = 4
@@ -60,51 +51,8 @@ _DIGITS = range(1, SHORT + 1), range(SHORT + 1, 13)
 """Digits of a short decimal, and of a longer one."""
 SMALL = 100
 """Denominators of small fractions."""
-DROP = 100.0
-"""Errors must fall by so much for a supposition without a free number, and ..."""
-FITTED_DROP = 1000.0
-"""... by so much for one whose numbers were fitted; ..."""
-LIKELY_DROP = 30.0
-"""... one without a free number by which it falls less is likely."""
 _ANISOTROPY = 3.0
 """Factor by which M may grow more than Ω."""
-FIRST = (6, 2)
-"""Of the samples away from t = 0, those judged by themselves: there a method of low order is off by little."""
-
-
-@dataclass(frozen=True, slots=True)
-class Diagnosis:
-    """A mistake that explains the states.
-
-    kind: which; docs/score.md lists them.  numbers: what fits, as text, by name.
-    error: the largest error of the states that were looked at, relative to the size of Ω and of γ; left: what is left
-    of it if the mistake is mended.  Both None where nothing was tried: then the states themselves show it.
-    looked_at: how many of the states, of how many, and the time of the last of them, as text, where not all were.
-    likely: whether the error falls by less than a statement asks for.  others: what explains them as well.
-    """
-
-    kind: str
-    numbers: dict[str, str] = field(default_factory=dict)
-    error: float | None = None
-    left: float | None = None
-    looked_at: tuple[int, int, str] | None = None
-    likely: bool = False
-    others: tuple[Diagnosis, ...] = ()
-
-
-def rounded(written: Sequence[Rounding], error: float | None) -> list[Diagnosis]:
-    """That the digits written explain the error, which is neither larger than they make it nor far smaller."""
-    explaining = (rounding for rounding in written if error is not None and explains(rounding, error))
-    return [Diagnosis("rounded", {"to": each.kind, "digits": str(each.digits)}) for each in explaining][:1]
-
-
-class Hypothesis(NamedTuple):
-    """A mistake that was tried: its kind, the numbers that fit, the error that it leaves, how far this must fall."""
-
-    kind: str
-    numbers: dict[str, str]
-    left: float
-    drop: float = DROP
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,6 +111,11 @@ class Examined:
         return [self.all_times[row] for row in self.rows]
 
     @property
+    def given_times(self) -> list[Fraction]:
+        """Times of these rows in the unit of the file."""
+        return [time * self.units.time for time in self.times]
+
+    @property
     def is_whole(self) -> bool:
         """Whether Ω and γ are known in every sample."""
         return not numpy.isnan(self.states[:, :6]).any()
@@ -199,22 +152,18 @@ class Examined:
         )
         return replace(self, top=top, frame=replace(self.frame, axes=axes)).starting(start)
 
-    def supposed(
-        self, times: Sequence[Fraction], top: HeavyTop | None = None, start: State | None = None
-    ) -> Array | None:
-        """The motion at any times, of both signs and in any order, with another top or start if given.
+    def supposed(self, times: Sequence[Fraction]) -> Array | None:
+        """The motion at any times, of both signs and in any order.
 
         None where it cannot be computed, and beyond :data:`FARTHEST` radians.
         """
         if any(abs(float(time)) * self.rate > FARTHEST for time in times):
             return None
         xi = self.frame.xi if self.system in WITH_ATTITUDE else None
-        states = motion(top or self.top, start or self.start, self.system, times, xi)
-        return (
-            None
-            if states is None
-            else (states.reshape(len(states), -1, 3) @ self.frame.axes.T).reshape(len(states), -1)
-        )
+        states = motion(self.top, self.start, self.system, times, xi)
+        if states is None:
+            return None
+        return (states.reshape(len(states), -1, 3) @ self.frame.axes.T).reshape(len(states), -1)
 
     def at(self, rows: Sequence[int]) -> Examined:
         """This motion at other samples."""
@@ -232,7 +181,8 @@ class Examined:
             return self
         top = HeavyTop([i * unit for i in self.top.inertia], self.top.weight / unit, self.top.centre, self.top.rotor)
         start = State([w / unit for w in self.start.omega], self.start.gamma)
-        other = replace(self, rate=self.rate / float(unit)).supposed([time * unit for time in self.times], top, start)
+        slower = replace(self, rate=self.rate / float(unit), top=top, start=start)
+        other = slower.supposed([time * unit for time in self.times])
         if other is None:
             return self
         states = other * numpy.array([float(unit)] * 3 + [1.0] * (other.shape[1] - 3))
@@ -252,17 +202,22 @@ class Examined:
             return None
         return None if states is None else states[0]
 
-    def errors(self, supposed: Array) -> Array:
-        """The error of each state relative to the size of Ω and γ in the supposed ones, shape (n,)."""
-        width = min(self.states.shape[1], supposed.shape[1])
-        off = numpy.abs(self.states[:, :width] - supposed[:, :width])
-        sizes = numpy.abs(supposed)
-        omega = max(sizes[:, :3].max(), 1e-3 * self.rate) or 1.0
-        gamma = sizes[:, 3:].max() or 1.0
+    def errors(self, supposed: Array | None) -> Array:
+        """The error of each state relative to the size of Ω and γ in the supposed ones; infinite without any.
+
+        supposed: shape (..., n, 6 or more), of as many motions as the axes before say.
+        """
+        if supposed is None:
+            return numpy.full(len(self.rows), numpy.inf)
+        width = min(self.states.shape[1], supposed.shape[-1])
+        off = numpy.abs(self.states[:, :width] - supposed[..., :width])
+        omega, gamma = (numpy.abs(part).max(axis=(-2, -1)) for part in (supposed[..., :3], supposed[..., 3:]))
+        omega = numpy.maximum(omega, 1e-3 * self.rate)[..., None]
+        gamma = numpy.where(gamma == 0, 1.0, gamma)[..., None]
         # of what the file gives
-        largest = (numpy.fmax.reduce(part, axis=1) for part in (off[:, :3] / omega, off[:, 3:] / gamma))
-        errors: Array = numpy.fmax(*largest)
-        return errors
+        of_omega, of_gamma = (numpy.fmax.reduce(part, axis=-1) for part in (off[..., :3], off[..., 3:]))
+        errors: Array = numpy.fmax(of_omega / omega, of_gamma / gamma)
+        return numpy.nan_to_num(errors, nan=numpy.inf, posinf=numpy.inf)
 
     def refusing(self, own: float) -> Examined:
         """This motion, whose error is ``own``, with the error of its first samples that refuses another."""
@@ -273,23 +228,16 @@ class Examined:
     def _first(self) -> int:
         return FIRST[0] + (not self.times[0])
 
-    def left(
-        self, top: HeavyTop | None = None, start: State | None = None, times: Sequence[Fraction] | None = None
-    ) -> float:
-        """The error beside another top, start or other times; infinite where the first samples refuse that motion."""
+    def beside(self, times: Sequence[Fraction] | None = None) -> Array:
+        """The error of each sample beside the motion, or that at other times; infinite behind a refusal."""
         times = self.times if times is None else times
-        for rows in (self.rows[: self._first], self.rows):
-            error = self.at(rows).error(self.supposed(times[: len(rows)], top, start))
-            if len(rows) < len(self.rows) and not error <= self.refused:
-                return float("inf")
-        return error
-
-    def error(self, supposed: Array | None) -> float:
-        """The largest of the errors; infinite for None."""
-        if supposed is None:
-            return float("inf")
-        worst = float(self.errors(supposed).max())
-        return worst if worst == worst else float("inf")
+        early = self.at(self.rows[: self._first])
+        errors = early.errors(early.supposed(times[: self._first]))
+        if len(errors) == len(self.rows):
+            return errors
+        if not errors.max() <= self.refused:
+            return numpy.append(errors, numpy.full(len(self.rows) - len(errors), numpy.inf))
+        return self.errors(self.supposed(times))
 
 
 def refused(early: float, largest: float, own: float) -> float:

@@ -33,7 +33,7 @@ _PATTERNS = tuple(
     for quantity, pattern in (
         ("quaternion", r"(?:q|quat|quaternion)([wxyz0-4])"),
         ("matrix", r"(?:r|m|a|c|dcm|rot|rotation|matrix)([0-3])([0-3])"),
-        ("rodrigues", r"(?:sigma|mrp|σ)([xyz123])"),
+        ("rodrigues", r"(?:sigma|mrp|σ)([xyz0-3])"),
         ("rotation_vector", r"(?:rotvec|rotationvector|rv)([xyz123])"),
         ("framed", r"w([xyz])"),
         ("omega_space", r"(?:w|omega|om|ω)(?:space|world|global|inertial|s)([xyz123])"),

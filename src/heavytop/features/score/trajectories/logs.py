@@ -40,10 +40,10 @@ _ALIASES = tuple(
         (r"(?:timestamp|stamp)_?(ns|us|ms)", "timestamp [{}]"),
         (r"(?:time|t)_?(ns|us|ms)", "t [{}]"),
         (r"%time", "timestamp [ns]"),
+        (r"sigma_BN[\[_(]([0-2])[\])]?", "sigma{}"),
+        (r"omega_BN_B[\[_(]([0-2])[\])]?", "omega{}"),
     )
 )
-_BASILISK = re.compile(r"(?:.*\.)?(sigma_BN|omega_BN_B)[\[_(]([0-2])[\])]?")
-"""Columns of vectors of Basilisk, counted from 0."""
 _JOINTS = {"free": (3, 3), "ball": (0, 0)}
 """Where the quaternion stands in qpos of MuJoCo, and the angular velocity, of the body, in qvel."""
 _INDEX = re.compile(r"(qpos|qvel)[\[_(]?(\d+)[\])]?", re.IGNORECASE)
@@ -56,7 +56,7 @@ _GIVES = {
     "an attitude": ("quaternion", "matrix", "euler", "rodrigues", "rotation_vector", "gamma"),
     "an angular velocity": ("omega", "omega_space", "framed"),
 }
-_OTHER = re.compile(r"(?:.*[._])?(?:cov|err|std|sigma_|desired|target|cmd|ref|bias)|b_[wa]_", re.IGNORECASE)
+_OTHER = re.compile(r"(?:.*[._])?(?:cov|err|std|sigma_(?!BN)|desired|target|cmd|ref|bias)|b_[wa]_", re.IGNORECASE)
 _WITH_UNIT = re.compile(r"(.*?)\s*([\[(](?!\s*[wxyz]\s*[\])])\s*(?:[^\[\]()\d][^\[\]()]*)?[\])])?")
 """The name of a column, and the unit behind it in brackets, which may be empty."""
 _OF_FOUR = re.compile(r"(.*[^\s])([wxyz])", re.IGNORECASE)
@@ -75,8 +75,6 @@ def canonical(name: str, joint: str = "") -> str:
 
 
 def _alias(text: str, joint: str) -> str:
-    if match := _BASILISK.fullmatch(text):
-        return f"{match[1].partition('_')[0]}{int(match[2]) + 1}"
     if _OTHER.match(text):
         return text
     if (match := _INDEX.fullmatch(text)) and joint in _JOINTS:

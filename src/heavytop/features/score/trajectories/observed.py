@@ -17,7 +17,6 @@ from heavytop.features.score.diagnose.readings import GivenStart, Reading, Seen,
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.attitude_error import Convention, Posed, space_to_body
 from heavytop.precision import (
-    DOUBLE,
     Precision,
     Vector,
     cross,
@@ -263,8 +262,6 @@ _ODD_GAMMA = Fraction(1, 10)
 """A state whose |γ|² is off 1 by more is not rounding, and seldom a method."""
 _FITS_ANYWHERE = 1 << 1023
 """Every format holds numbers below that."""
-_SMALLEST, _LARGEST = Fraction(1, 1 << 1000), 1 << 1000
-"""Between them a double has all its bits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -369,16 +366,9 @@ def named(text: str, what: str) -> str:
 
 def rounded_state(values: list[Fraction | None], precision: Precision) -> tuple[Fraction, ...] | None:
     """The numbers rounded to the format; None where one is not finite there, as 1e400 in double."""
-    numbers = tuple(_rounded_given(value, precision) for value in values if value is not None)
+    numbers = tuple(round_to(value, precision.bits) for value in values if value is not None)
     finite = len(numbers) == len(values) and all(_fits(value, precision) for value in numbers)
     return numbers if finite else None
-
-
-def _rounded_given(value: Fraction, precision: Precision) -> Fraction:
-    """As :func:`heavytop.precision.round_to`; the processor's own rounding where it does the same."""
-    if precision is DOUBLE and _SMALLEST <= abs(value) < _LARGEST:
-        return Fraction(float(value))
-    return round_to(value, precision.bits)
 
 
 def _fits(value: Fraction, precision: Precision) -> bool:

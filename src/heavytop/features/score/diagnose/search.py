@@ -1,0 +1,169 @@
+"""Hypotheses about a file, each tried once, and the simplest that explains all samples looked at, or the first ones.
+
+A hypothesis counts if the error falls by two decades with it, by three where a number was fitted; where several do
+about as well the simplest is named.  Of the first samples a fall by a factor of 30 makes one without a number likely.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy
+from numpy.typing import NDArray
+
+from heavytop.measure.scalar import Rounding, explains
+from heavytop.precision import plain_decimal
+
+Array = NDArray[numpy.float64]
+
+WORTH_ASKING = 1e-10
+"""Relative errors below it are no mistake."""
+ALIKE = 30.0
+"""Of hypotheses whose errors differ by less, the simplest is meant; ..."""
+AS_LIKELY = 3.0
+"""... so of likely ones."""
+FLOOR = 1e-13
+"""Relative errors below it are heyoka's own."""
+DROP = 100.0
+"""Errors must fall by so much for a hypothesis without a free number, and ..."""
+FITTED_DROP = 1000.0
+"""... by so much for one whose numbers were fitted; ..."""
+LIKELY_DROP = 30.0
+"""... one without a free number by which it falls less is likely."""
+_NOTHING = 0.5
+"""A hypothesis that leaves more explains nothing, however large the error is without it."""
+FIRST = (6, 2)
+"""Of the samples away from t = 0, those judged by themselves: there a method of low order is off by little."""
+_MOST_OTHERS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """A mistake that explains the states.
+
+    kind: which; docs/score.md lists them.  numbers: what fits, as text, by name.
+    error: the largest error of the states that were looked at, relative to the size of Ω and of γ; left: what is left
+    of it if the mistake is mended.  Both None where nothing was tried: then the states themselves show it.
+    looked_at: how many of the states, of how many, and the time of the last of them, as text, where not all were.
+    likely: whether the error falls by less than a statement asks for.  others: what explains them as well.
+    """
+
+    kind: str
+    numbers: dict[str, str] = field(default_factory=dict)
+    error: float | None = None
+    left: float | None = None
+    looked_at: tuple[int, int, str] | None = None
+    likely: bool = False
+    others: tuple[Diagnosis, ...] = ()
+
+
+def rounded(written: Sequence[Rounding], error: float | None) -> list[Diagnosis]:
+    """That the digits written explain the error, which is neither larger than they make it nor far smaller."""
+    explaining = (rounding for rounding in written if error is not None and explains(rounding, error))
+    return [Diagnosis("rounded", {"to": each.kind, "digits": str(each.digits)}) for each in explaining][:1]
+
+
+class Hypothesis(NamedTuple):
+    """A mistake that was tried.
+
+    numbers: that fit.  errors: that it leaves of each sample, or of all but one at an end.
+    drop: how far the error must fall.  is_round: whether a number that was fitted is one of three digits.
+    """
+
+    kind: str
+    numbers: dict[str, str]
+    errors: Array
+    drop: float = DROP
+    is_round: bool = False
+
+    def left(self, looked: int | None = None) -> float:
+        """The largest error that it leaves of the first so many samples."""
+        return float(self.errors[:looked].max())
+
+    def least_fall(self, likely: float) -> float:
+        """How far the error must fall; by less, ``likely`` or for a round number DROP, where it need only be likely."""
+        return self.drop if not likely else likely if self.drop == DROP else DROP if self.is_round else self.drop
+
+
+class Search:
+    """The search for the mistake of a file.
+
+    own: the error of each sample that is looked at, as the file stands.  times: of these, in units of the file.
+    states: how many the file has.  names_others: whether a diagnosis names what explains the file as well.
+    """
+
+    own: Array
+    times: Sequence[Fraction]
+    states: int
+    names_others = False
+
+    def hypotheses(self) -> Iterable[Hypothesis]:
+        """The simplest first, those with a fitted number last."""
+        raise NotImplementedError
+
+    def further(self, diagnosis: Diagnosis | None, own: float) -> Iterator[Hypothesis]:
+        """What is tried only where nothing, or nothing better than this, explains an error."""
+        raise NotImplementedError
+
+    @cached_property
+    def tried(self) -> list[Hypothesis]:
+        """All hypotheses, with the errors that they leave."""
+        return [*self.hypotheses()]
+
+    def sure(self, first: int | None = None, drop: float = 0.0) -> Diagnosis | None:
+        """The simplest mistake among those that explain the samples about as well as the best; None where none does.
+
+        first: of the first samples alone, where no number is fitted.  drop: a smaller one than usual.
+        """
+        looked = len(self.own) if first is None else first + (not self.times[0])
+        if looked > len(self.own):
+            return None
+        own = float(self.own[:looked].max())
+        own = own if numpy.isfinite(own) else 1.0
+        if not own > WORTH_ASKING:
+            return None
+        plain = (hypothesis for hypothesis in self.tried if hypothesis.drop == DROP)
+        of_all = (hypothesis for hypothesis in plain if len(hypothesis.errors) == len(self.own))
+        tried = self.tried if first is None else [*of_all]
+        diagnosis = self.best(tried, own, looked, drop)
+        further = [*self.further(diagnosis, own)] if first is None and not drop else []
+        return self.best([*further, *tried], own, looked) if further else diagnosis
+
+    def best(
+        self, tried: Sequence[Hypothesis], own: float, looked: int | None = None, drop: float = 0.0
+    ) -> Diagnosis | None:
+        """The simplest of these hypotheses that explains the error of the first so many samples."""
+        looked = len(self.own) if looked is None else looked
+        lefts = [(hypothesis, hypothesis.left(looked)) for hypothesis in tried]
+        lefts = [pair for pair in lefts if pair[1] <= _NOTHING]
+        explained = [(hypothesis, left) for hypothesis, left in lefts if left * hypothesis.least_fall(drop) <= own]
+        if not explained:
+            return None
+        best = min(max(left, FLOOR) for _, left in explained)
+        alike = [(hypothesis, left) for hypothesis, left in explained if left <= (AS_LIKELY if drop else ALIKE) * best]
+        first, left = alike[0]
+        numbers, others = first.numbers, list[Diagnosis]()
+        if self.names_others:
+            first, left = _of_kind(first.kind, alike)
+            # with a number that was fitted more can be explained
+            equal = [pair for pair in alike if pair[0].drop <= first.drop and pair[0].kind != first.kind]
+            kinds = list(dict.fromkeys(hypothesis.kind for hypothesis, _ in equal))[:_MOST_OTHERS]
+            others = [Diagnosis(kind, _of_kind(kind, equal)[0].numbers) for kind in kinds]
+            numbers = first.numbers | ({"or": ", ".join(kinds)} if kinds else {})
+        return Diagnosis(
+            first.kind, numbers, own, left, scope(self.times[:looked], self.states), bool(drop), (*others,)
+        )
+
+
+def scope(times: Sequence[Fraction], states: int) -> tuple[int, int, str] | None:
+    """How many samples, of how many, and the time of the last of them; None for all."""
+    return None if len(times) == states else (len(times), states, plain_decimal(times[-1], 6))
+
+
+def _of_kind(kind: str, tried: Sequence[tuple[Hypothesis, float]]) -> tuple[Hypothesis, float]:
+    """The hypothesis of a kind whose number fits best, and the error that it leaves."""
+    return min((pair for pair in tried if pair[0].kind == kind), key=lambda pair: max(pair[1], FLOOR))
