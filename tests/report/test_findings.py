@@ -45,8 +45,8 @@ def test_an_order_leads_then_failures_digits_laws_and_that_nothing_else_changed(
     ]
     said = found(healthy, faulty)
     assert said[0] == "Order observed 5 → 2 in single steps on euler (mine:rk5, double)."
-    assert said[1] == "1 row of mine:rk5 failed on delone at T = 100 (mine:rk5, double): it returned NaN."
-    assert said[2] == "Digits right 8.9 → 7.5 on lagrange at T = 100 (mine:rk5, double), fewer on 1 other row too."
+    assert said[1] == "1 row of mine:rk5 failed on delone up to T = 100 (mine:rk5, double): it returned NaN."
+    assert said[2] == "Digits right 8.9 → 7.5 on lagrange up to T = 100 (mine:rk5, double), fewer on 1 other row too."
     assert said[3].startswith("The error along the flow grows like t (was t^0.5) on grioli")
     assert said[-1] == "No other row changed."
     assert len(said) == 5
@@ -94,7 +94,7 @@ def test_rows_of_two_versions_are_one_row_and_both_versions_are_said() -> None:
     plain = {"3.3": [work(10, "1e-4"), work(100, "1e-8")], "4.0": [work(10, "1e-4"), work(100, "1e-6")]}
     old, new = ([replace(row, key=row.key.of_version(v)) for row in rows] for v, rows in plain.items())
     assert "(mine:rk5 3.3 → 4.0, double)" in found(old, new)[0]
-    assert "on euler at T = 100 (mine:rk5 3.3 → 4.0, step 1/100, double)" in found(old, new)[1]
+    assert "on euler up to T = 100 (mine:rk5 3.3 → 4.0, step 1/100, double)" in found(old, new)[1]
     assert found(old, plain["4.0"]) == found(plain["3.3"], plain["4.0"])
     over = history([report(*old), report(*new)], Policy())
     assert {track.row.versions for track in over} == {("3.3", "4.0")}
@@ -106,7 +106,7 @@ def test_rows_of_two_versions_are_one_row_and_both_versions_are_said() -> None:
 
 def test_other_steps_at_the_same_setting_are_said() -> None:
     old, new = rk5(metrics={DIGITS: error("1e-9")}, steps=1000), rk5(metrics={DIGITS: error("1e-8")}, steps=700)
-    assert "Steps 1000 → 700 at the same setting on euler at T = 100 (mine:rk5, double)." in found([old], [new])
+    assert "Steps 1000 → 700 at the same setting on euler up to T = 100 (mine:rk5, double)." in found([old], [new])
     assert not any("Steps" in each for each in found([old], [replace(new, steps=1010)]))
 
 
@@ -152,7 +152,7 @@ def test_rows_that_failed_are_counted_with_the_first_and_its_reason() -> None:
     old = [rk5(case=case) for case in ("euler", "lagrange", "grioli")]
     new = [old[0], failing(old[1], "out_of_time", "not done within 40 s"), failing(old[2], "out_of_time", "later")]
     assert found(old, new) == [
-        "2 rows of mine:rk5 failed, first on lagrange at T = 100 (mine:rk5, double): "
+        "2 rows of mine:rk5 failed, first on lagrange up to T = 100 (mine:rk5, double): "
         "out_of_time, not done within 40 s.",
         "No other row changed.",
     ]
@@ -161,7 +161,7 @@ def test_rows_that_failed_are_counted_with_the_first_and_its_reason() -> None:
 
 def test_a_row_that_failed_in_both_reports_is_the_same_and_said() -> None:
     pair = [rk5(), failing(rk5(case="delone"))]
-    said = "1 row of mine:rk5 failed in both reports on delone at T = 100 (mine:rk5, double): it returned NaN."
+    said = "1 row of mine:rk5 failed in both reports on delone up to T = 100 (mine:rk5, double): it returned NaN."
     assert found(pair, pair) == ["Nothing changed: 2 metrics are within what is allowed.", said]
     assert found(pair[1:], pair[1:]) == [said]
     worse = [replace(pair[0], metrics={"drift_energy_max": error("1")}), pair[1]]
@@ -171,7 +171,7 @@ def test_a_row_that_failed_in_both_reports_is_the_same_and_said() -> None:
 def test_a_run_that_stops_earlier_says_where() -> None:
     old = rk5(outcome="step_limit", time_reached="80", finite=False)
     new = replace(old, time_reached="40")
-    said = "1 row of mine:rk5 stops earlier on euler at T = 100 (mine:rk5, double): step_limit, at t = 40 of 100."
+    said = "1 row of mine:rk5 stops earlier on euler up to T = 100 (mine:rk5, double): step_limit, at t = 40 of 100."
     assert found([old], [new])[0] == said
 
 
@@ -203,7 +203,7 @@ def test_what_explains_the_states_comes_first_and_counts_its_rows() -> None:
         for each, what in zip(healthy, (other, late, late), strict=True)
     ]
     first = found(healthy, faulty)[0]
-    assert first == "The states are one row late. Seen on lagrange at T = 100 (mine:rk5, double) and 1 other row."
+    assert first == "The states are one row late. Seen on lagrange up to T = 100 (mine:rk5, double) and 1 other row."
     long = [replace(each, explained=Explained("start", "x" * 5000)) for each in faulty]
     assert len(found(healthy, long)[0]) <= 300
     assert not any("late" in each for each in found(faulty, [replace(faulty[0], metrics={}), *faulty[1:]]))

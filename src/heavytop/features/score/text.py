@@ -480,8 +480,8 @@ def one_motion(row: Row, beside: Beside) -> Iterator[Block]:
         yield Card("Remarks", remarks, note=compared, shown=In.FULL | In.PAGE)
     yield Chart(digits_over_time)
     units = (
-        "Errors of Ω and along and across the flow in 1/time unit, of γ in units of |γ| = 1; drift of each first "
-        "integral in its own units."
+        "Errors of Ω in 1/time unit, of γ in units of |γ| = 1; along and across the flow: of the six numbers together, "
+        "which depends on the unit of time; drift of each first integral in its own units."
     )
     yield Table("Errors and drift", _SIZES, sizes(row), [units], shown=In.FULL | In.PAGE)
 

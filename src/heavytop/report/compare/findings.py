@@ -261,7 +261,7 @@ def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[s
         keys = {msgspec.structs.replace(change.identity.key, case="") for change in changes.rows}
         names = " and ".join(_case(change.identity) for change in changes.rows)
         asked = (
-            f"Only the names differ: {names}."
+            f"Only the names differ: {names}. Rows of the same name (`# name:` of a trajectory) are compared."
             if (len(keys), len(changes.rows)) == (1, 2)
             else "Were they made with the same plan?"
         )
@@ -357,10 +357,10 @@ def _curve(row: Identity) -> tuple[str, str, str]:
 
 
 def _where(row: Identity, at: bool = True) -> str:
-    """``lagrange at T = 100 (mine:rk4, step 1/100, double)``."""
+    """``lagrange up to T = 100 (mine:rk4, step 1/100, double)``."""
     key = row.key
     inside = ", ".join(part for part in (clip(row.program, 40), key.subject.asked, key.precision) if part)
-    end = f" at T = {short(key.horizon.removeprefix('-'))}" if at and key.horizon not in ("", "0") else ""
+    end = f" up to T = {short(key.horizon.removeprefix('-'))}" if at and key.horizon not in ("", "0") else ""
     return f"{_case(row)}{end} ({inside})"
 
 
@@ -369,7 +369,7 @@ def _case(row: Identity) -> str:
 
 
 def _on(rows: Sequence[Identity]) -> str:
-    """`` on lagrange at T = 100 (...)`` of one row; of several the first."""
+    """`` on lagrange up to T = 100 (...)`` of one row; of several the first."""
     return f"{', first' if len(rows) > 1 else ''} on {_where(rows[0])}"
 
 

@@ -479,16 +479,18 @@ def laws_headline(rows: Sequence[Row]) -> Headline | None:
     """
     theirs = [row for row in rows if row.key.subject.name not in (HEYOKA, MULTIWORD)]
     healthy = theirs or [row for row in rows if not row.key.subject.variant] or rows
-    parts = [_followed(healthy, drifts=False), _followed(healthy, drifts=True)]
+    of_what = " with default options" if not theirs and len(healthy) < len(rows) else ""
+    parts = [_followed(healthy, drifts, of_what) for drifts in (False, True)]
     sentence = ", ".join(part for part in parts if part)
     faults = [row for row in rows if row.key.subject.bias]
     distinguished = sum(_told(row, healthy) for row in faults)
     if faults and sentence:
-        sentence += f"; {distinguished} of {len(faults)} planted faults show another law"
+        bias = " and ".join(dict.fromkeys(f"I1 off by {row.key.subject.bias}" for row in faults))
+        sentence += f"; {distinguished} of {len(faults)} with {bias} show another law"
     return Headline(f"{sentence[0].upper()}{sentence[1:]}.") if sentence else None
 
 
-def _followed(rows: Sequence[Row], drifts: bool) -> str:
+def _followed(rows: Sequence[Row], drifts: bool, of_what: str) -> str:
     """``errors along the flow grow like t^1.5 (4 of 5 ensembles)``, and what a third of them or more do besides."""
     laws = Counter(growth for row in rows for growth in {law.growth for law in _laws(row, drifts)})
     of = sum(bool(_laws(row, drifts)) for row in rows)
@@ -498,7 +500,7 @@ def _followed(rows: Sequence[Row], drifts: bool) -> str:
     both = [most, *(pair for pair in next_to_it if 3 * pair[1] >= of > 1)]
     # regular motions before those that amplify every error
     (growth, count), *others = sorted(both, key=lambda pair: pair[0] == "exponential")
-    law = _HOW.get(growth, f"like {growth}") + (f" ({count} of {of} ensembles)" if of > 1 else "")
+    law = _HOW.get(growth, f"like {growth}") + (f" ({count} of {of} ensembles{of_what})" if of > 1 else "")
     law += "".join(f" or {_HOW.get(other, f'like {other}')} ({times})" for other, times in others)
     name = rows[0].key.subject.name
     whose = "" if name in (HEYOKA, MULTIWORD) else f" of {clip(name, 40)}"

@@ -154,4 +154,8 @@ def _summary(rows: Sequence[Row]) -> str:
     off = "has no finite error of Ω" if worst is None else f"is off by up to {short(worst[1])} in Ω ({worst[2]})"
     if since is None:
         return f"{off}, finite throughout"
+    overflow = [row.metrics[Quantity(_COUNT, "omega", _SINCE).text] for row in rows]
+    finite = min(((time.log10, time.value) for time in overflow if time.log10 is not None), default=None)
+    if finite is not None and worst is not None:
+        off += f" while Ω is finite, before |t| = {short(finite[1])}"
     return f"{off}, {_SYMBOLS[since[2]]} not finite from |t| = {short(since[1])}"

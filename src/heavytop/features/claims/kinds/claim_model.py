@@ -110,8 +110,9 @@ def claim_error(sources: Sources, first: Iterable[str] = ()) -> Section | None:
             "The model’s error of the attitude is the angle between the two attitudes: both motions start at the pole "
             "γ = e3, where φ and ψ are undefined and their differences say nothing. Beside it the error of the formula "
             "for ψ, which turns the attitude by as much.",
-            "Crosses along the top mark times at which floating point gives NaN or an infinity; an error of exactly 0 "
-            "has no place on these axes.",
+            "Crosses along the top mark times at which floating point gives NaN or an infinity. Errors below 1e-26 are "
+            "not drawn, where Ω itself decays, nor is one of exactly 0. Of each case the motion forward in time is "
+            "drawn; backward is in the rows.",
         ],
         columns=["case", "error", "quantity", "|t| = 1", "largest drawn", "not finite from |t|"],
         across=2,
