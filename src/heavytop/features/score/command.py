@@ -52,8 +52,8 @@ def score(
 
     Several files are scored in parallel, a line each; files that differ in their step alone give the order.
 
-    Exit 0 where the trajectory reached its end, however few digits are right; with --require 1 where fewer are right;
-    3 where it ended early, where its time goes back, or that is not known.
+    Exit 0 where the trajectory reached its end, however few digits are right; 3 where it ended early.  With --require
+    also 1 where fewer are right, and 3 where its time goes back or the digits are not known.
     """
     from heavytop.features.score.api import read_trajectory, scored
     from heavytop.files import replace_all
