@@ -20,13 +20,17 @@ from heavytop.cli import app
 from heavytop.errors import InputError
 from heavytop.features.kinds import KINDS
 from heavytop.features.score.measurement import Assessment, assess
-from heavytop.features.score.text import guessed, requirement, score_report, score_text
+from heavytop.features.score.text import digits_over_time, guessed, requirement, score_report, score_text
 from heavytop.features.score.trajectories.files import read as read_file
 from heavytop.features.score.trajectories.observed import GivenTrajectory, of_arrays
 from heavytop.harness.plan import read
 from heavytop.integrate.heyoka.motions import propagate
+from heavytop.measure.scorer import SOLUTION_ERROR
 from heavytop.precision import DOUBLE
+from heavytop.records import Quantity, Series
 from heavytop.report.render.page import report_page
+from support import small_reports
+from support.small_reports import error
 
 pytestmark = pytest.mark.pictures
 
@@ -290,3 +294,13 @@ def test_numbers_of_single_precision_are_noticed(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
         read_file(tmp_path / "comma.csv", case)
     assert caught.value.remedy == "Are these decimal commas? Separate the columns by semicolons."
+
+
+@pytest.mark.parametrize(("most", "said"), [("1e-4", ["Between them the fewest digits right are 4.0."]), ("1e-8", [])])
+def test_an_error_between_the_samples_that_are_drawn_is_said(most: str, said: list[str]) -> None:
+    across = Quantity(SOLUTION_ERROR, "across")
+    course = {across.text: Series(["1", "20"], ["1e-9", "1e-8"], across)}
+    one = small_reports.row(series=course, metrics={across.over("max").text: error(most)}, samples=20)
+    section = digits_over_time([("", small_reports.report(one))])
+    assert section is not None
+    assert section.notes == ["2 of 20 samples, evenly in log |t|; the verdict counts all.", *said]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict
 from fractions import Fraction
 from typing import Any
@@ -18,7 +18,7 @@ from heavytop.features.score.measurement import Assessment, direction, passed
 from heavytop.measure.attitude_error import ATTITUDE_ERROR, JOINT_VIOLATION, POSITION_ERROR
 from heavytop.measure.scalar import digits_kept, digits_of, digits_right, digits_text
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR
-from heavytop.records import SCHEMA, Beside, Peer, Quantity, Report, Row
+from heavytop.records import SCHEMA, Beside, Peer, Quantity, Report, Row, Series
 from heavytop.report.document.document import (
     DASHED,
     TIME,
@@ -486,6 +486,20 @@ def one_motion(row: Row, beside: Beside) -> Iterator[Block]:
     yield Table("Errors and drift", _SIZES, sizes(row), [units], shown=In.FULL | In.PAGE)
 
 
+def _not_drawn(row: Row, held: Iterable[Series], right: Callable[[float], float]) -> list[str]:
+    """A sentence where the largest error of a curve lies between the samples that are drawn."""
+    lacking = []
+    for series in held:
+        most, drawn = series.quantity and row.metrics.get(series.quantity.over("max").text), points(series)[1]
+        if most and most.log10 is not None and drawn and most.log10 > max(drawn) + _BETWEEN:
+            lacking.append(right(most.log10))
+    return [f"Between them the fewest digits right are {min(lacking):.1f}."] if lacking else []
+
+
+_BETWEEN = 0.1
+"""Decades by which an error between the samples drawn exceeds theirs, for it to be mentioned."""
+
+
 def digits_over_time(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     """Digits right over |t|, of each error that has a series; None for several motions, without a reference, and
     without a sample away from 0.
@@ -528,7 +542,8 @@ def digits_over_time(sources: Sources, first: Iterable[str] = ()) -> Section | N
     at = [dict(zip(series.times, series.values, strict=True)) for series in held.values()]
     times = dict.fromkeys(time for values in at for time in values)
     if row.samples > len(times):
-        section.notes.append(f"{len(times)} of {row.samples} samples, evenly in log |t|; the errors are those of all.")
+        section.notes.append(f"{len(times)} of {row.samples} samples, evenly in log |t|; the verdict counts all.")
+        section.notes += _not_drawn(row, held.values(), right)
     section.rows = [[short(time), *(cell(values.get(time, "")) for values in at)] for time in times]
     section.pictures.append(finish(axes, section.title, spoken(alternative), section.id))
     return section

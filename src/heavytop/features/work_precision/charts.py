@@ -64,7 +64,8 @@ def work_precision(sources: Sources, first: Iterable[str] = ()) -> Section | Non
             "farther left, the better. A curve is one integrator over its tolerances or steps; the time to compile is "
             "apart, in the numbers. A cross on the right edge is a run aborted before the end, at the time it "
             "took: it has no error. heyoka:constants has the numbers of the top compiled into its code; heyoka with "
-            "general code, and the others, are given them when they run.",
+            "general code, and the others, are given them when they run. heyoka:lanes runs eight motions side by side; "
+            "its time is an eighth of theirs, and is in no ranking.",
         ],
         answers=Table("Seconds that heyoka and the best of the others take for an error", _LEADS, cells)
         if cells
@@ -131,7 +132,10 @@ def _lead_cells(lead: Lead, source: str) -> list[str]:
 
 
 def _picture(lines: Sequence[tuple[str, WorkPrecisionLine]], colours: dict[str, int], title: str, name: str) -> Picture:
-    names = [clip(line.label, 30) + (f", {source}" if source else "") for source, line in lines]
+    names = [
+        clip(line.label, 30) + (f", {source}" if source else "") + (", × aborted" if line.failures else "")
+        for source, line in lines
+    ]
     height = max(3.4, 1 + 0.17 * len(lines))
     axes = new_axes("error (units of Ω and γ)", "time of a run (s)", height, room(names))
     decades(axes.xaxis)

@@ -197,7 +197,8 @@ def _thinned(rows: Iterable[Row]) -> list[str]:
     if not fewer:
         return []
     drawn, taken = (_span(sorted(part)) for part in zip(*fewer, strict=True))
-    return [f"Curves show {drawn} of {taken} samples; the largest errors are those of all."]
+    between = "a larger error may lie between; digits and tables count all"
+    return [f"Curves show {drawn} of {taken} samples, evenly in log |t|: {between}."]
 
 
 def _span(counts: Sequence[int]) -> str:
@@ -337,7 +338,9 @@ def _digits_right(section: Section, precision: str, lanes: dict[str, list[_Run]]
             if source and kept is not None:
                 section.key(key)
             draw(axes, key, [kept or 0.0], [-index], 5)
-            axes.plot([(kept or 0.0) - band, (kept or 0.0) + band], [-index] * 2, color=COLOURS[0], lw=3, alpha=0.3)
+            if band:
+                ends_of_bar = [(kept or 0.0) - band, (kept or 0.0) + band]
+                axes.plot(ends_of_bar, [-index] * 2, color=COLOURS[0], lw=3, alpha=0.3)
         ends.append(End(texts[lane], COLOURS[0], kept or 0.0, -index))
     axes.set(xlim=(-0.02 * most, 1.02 * most), ylim=(0.7 - len(lanes), 0.7), yticks=[])
     axes.axvline(most, color=COLOURS[_GREY], lw=0.9, ls=DASHED)
