@@ -224,7 +224,7 @@ def test_an_error_below_what_a_float_holds_is_not_printed_as_0() -> None:
     start = ht.State(("1/4", "-3/8", "7/4"), ("3/5", 0, "4/5"))
     run = ht.propagate(top, start, ["1/8"], form)
     lines = {
-        line[:24].strip(): line.split()[-3:]
+        re.split(r"\s{2,}", line.strip())[0]: line.split()[-3:]
         for line in str(ht.score(["1/8"], run.states, top=top, start=start, precision=form)).splitlines()
     }
     for label in ("error of Ω", "error of γ", "drift of energy"):

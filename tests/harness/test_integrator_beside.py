@@ -8,7 +8,10 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.features.kinds import KINDS
+from heavytop.harness.checkpoint import Saved
 from heavytop.harness.plan import read
+from heavytop.harness.rows import measure as measured
+from heavytop.report.render.text import failed
 from support.reports import measure
 
 PLAN = """
@@ -75,14 +78,15 @@ def test_its_rows_are_scored_like_those_of_heyoka(plan: str, integrator: str) ->
     assert kept < (1e-15 if integrator == "multiword" else 1e-8)
 
 
-def test_what_it_cannot_do_is_a_row_that_failed(tmp_path: Path) -> None:
+def test_a_format_that_it_lacks_is_unsupported_and_no_failure(tmp_path: Path) -> None:
     (tmp_path / "quad.toml").write_text(
         'name = "q"\n[[measure]]\nkind = "drift"\ncases = ["euler"]\nruns = [{ precision = "quad", horizon = "1" }]\n'
     )
     _, theirs = read(str(tmp_path / "quad.toml"), KINDS, integrator="scipy:DOP853")[2]
-    row = measure(theirs)
-    assert (row.outcome, row.metrics) == ("failed", {})
-    assert row.reference.reason.startswith("scipy:DOP853 has no quad, in euler")
+    row = measured(KINDS[theirs.key.kind], theirs, Saved())
+    assert (row.outcome, row.metrics) == ("unsupported", {})
+    assert row.reference.reason.startswith("scipy:DOP853 has no quad")
+    assert not failed(row, KINDS)
 
 
 @pytest.mark.parametrize("integrator", ["multiword", "splitting:8"])
@@ -114,11 +118,3 @@ def test_who_stands_beside_heyoka_is_another_that_is_known(plan: str, tmp_path: 
         with pytest.raises(InputError, match=cause) as caught:
             read(name, KINDS, integrator=integrator)
         assert caught.value.remedy
-
-
-def test_a_format_that_an_integrator_lacks_is_unsupported_and_no_failure(tmp_path: Path) -> None:
-    file = tmp_path / "formats.toml"
-    file.write_text(PLAN.replace('precision = "double"', 'precision = "quad"', 1))
-    _, _, tasks = read(str(file), KINDS, integrator="scipy:DOP853")
-    (task,) = [task for task in tasks if task.key.kind == "drift" and task.key.subject.name == "scipy:DOP853"]
-    assert measure(task).outcome == "unsupported"

@@ -209,7 +209,7 @@ def run(
     ] = "default",
     integrator: Annotated[str, typer.Option(help="Measure it beside heyoka: a name, mine.toml, mine.py:solve.")] = "",
     out: Annotated[
-        Path | None, typer.Option(help="New folder DIR for the report, else heavytop-results/PLAN-TIME.")
+        Path | None, typer.Option(help="New folder DIR for the report; without it one in `heavytop-results`.")
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the run that --out holds.")] = False,
     workers: Annotated[int | None, typer.Option(help="Local processes; as many as there are processors.")] = None,

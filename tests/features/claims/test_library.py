@@ -14,6 +14,7 @@ import heavytop as ht
 from heavytop.features.claims.audit import audit as auditing
 from heavytop.features.claims.audit.audit import claim_from_table
 from heavytop.features.claims.library import entry as entries
+from heavytop.files import cache_folder
 from support import in_process
 
 HEAD: dict[str, Any] = {
@@ -129,7 +130,7 @@ def test_a_verdict_is_kept_for_the_same_entry_alone(folder: Path, monkeypatch: p
     put(folder, HEAD | CLAIM | {"note": "Another note."})
     assert ht.claim_library().verdicts[HEAD["id"]].verdict == "holds"
     assert calls == [HEAD["id"]]
-    for kept in auditing.cache_folder("claims").glob("*.json"):  # damaged: read as nothing
+    for kept in cache_folder("claims").glob("*.json"):  # damaged: read as nothing
         kept.write_bytes(kept.read_bytes()[:-7])
     assert ht.claim_library("lagrange").verdicts[MISPRINT["id"]].verdict == "refuted"
     assert sorted(calls[1:]) == sorted([HEAD["id"], MISPRINT["id"]])

@@ -278,14 +278,15 @@ def test_a_pole_is_no_event() -> None:
     assert [-d for d in plain.directions] == over.directions
 
 
-class Broken(Dense):
+def broken(first, second):
     """Two steps of f = Ω1 that do not meet at their common end, by a rounding."""
 
-    def _steps(self):
-        first, second = self.ends
+    def steps(run: Dense):
         for began, coefficients in ((0, first), (1, second)):
             yield Piece(Fraction(began), Fraction(1), 53, lambda i, c=coefficients: c if i == 0 else [(1, 0)] * len(c))
-            self.steps += 1
+            run.steps += 1
+
+    return steps
 
 
 @pytest.mark.parametrize(
@@ -299,11 +300,8 @@ class Broken(Dense):
     ],
 )
 def test_a_change_at_the_common_end_of_two_steps_counts_once(first, second, count) -> None:
-    class Run(Broken):
-        ends = first, second
-
     problem = Problem.of(TOP, START, ht.DOUBLE)
-    found = locate(Run(problem, Fraction(2)), "planted", event_function("omega1"), 0)
+    found = locate(Dense(broken(first, second), problem, Fraction(2)), "planted", event_function("omega1"), 0)
     assert len(found) == count
     assert all(abs(float(t) - 1) < 1e-12 for t in found.times)
 

@@ -59,7 +59,7 @@ def printed(found, width: int = 80) -> list[str]:
 def unknown() -> Assessment:
     """Of a motion that has no reference: most of its time goes into looking for one."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("heavytop.features.score.measurement.diagnose", lambda *_, **__: [])
+        patch.setattr("heavytop.features.score.diagnose.diagnosis.diagnose", lambda *_, **__: [])
         return assess(given(CASES["generic"], [Fraction(3000)]))
 
 

@@ -12,6 +12,8 @@ from heavytop.report.document.svg import quiet_style
 from support.report_helpers import GROWTH, HOSTILE, LONG, WORK, law, method
 from support.reports import compare, comparison_page
 
+pytestmark = pytest.mark.pictures
+
 T = numpy.array([float(time) for time in LONG])
 
 

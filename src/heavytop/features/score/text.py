@@ -383,7 +383,8 @@ def guessed(assessment: Assessment) -> str | None:
     """That the format was not named, and what it was taken for."""
     if not assessment.format_guessed:
         return None
-    said = f"No format is named; {assessment.row.precision} is the narrowest that holds the digits written."
+    name = assessment.row.precision
+    said = f"No format is named; {name} is the narrowest, from double on, that holds the digits written."
     single = " Every number in the states is one of single precision (24 bits): perhaps they were computed in it."
     return said + (single if assessment.single else "")
 

@@ -93,6 +93,9 @@ def _readings() -> Iterator[tuple[int, str, dict[str, str], list[int], list[floa
             yield changes, kind, numbers, [place for place, _ in columns], [factor for _, factor in columns]
 
 
+_LARGEST_UNIT = Fraction(10) ** 300
+
+
 @cache
 def _every_reading() -> tuple[tuple[Any, ...], ...]:
     """Changes, kinds, numbers, places and factors of every reading, the simplest first."""
@@ -104,7 +107,8 @@ def readings(run: Examined, truth: Array) -> tuple[list[Hypothesis], list[Hypoth
     if len(run.frame.columns) < 6:
         return [], []
     changes, kinds, numbers, places, factors = _every_reading()
-    time, inertia = float(run.units.time), float(run.units.inertia)
+    # no momentum of a larger unit is in double
+    time, inertia = float(run.units.time), float(min(run.units.inertia, _LARGEST_UNIT))
     columns = numpy.hstack([truth[:, :6], inertia * truth[:, :3] @ run.tensor])
     place, factor = numpy.array(places), numpy.array(factors)
     # a vector in the place of the other is in the unit of that

@@ -34,6 +34,7 @@ from heavytop.features.score.trajectories.observed import (
 )
 from heavytop.files import read_whole, without_repeats
 from heavytop.integrate.trajectory import Outcome
+from heavytop.measure.attitude_error import WIDTHS
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, Vector, decimal_text, exact_text, parse, real, shown
 from heavytop.top.attitude import SHAPES, key_of
 from heavytop.top.bodies import BODY, CENTRE, Body, body_of
@@ -121,7 +122,7 @@ class TextTable:
         said = [f"{name} in {unit}" for name, unit in units.items() if name != "position"]
         self.notes += [f"as the header says, {', '.join(said)}"] if said else []
         if meaning.time is not None and (meaning.units or observed_columns.is_more_than_states(meaning)):
-            self.header, others = meaning, list(meaning.others)
+            self.header, others = meaning, [*meaning.others, *(names[place] for place in _parts(meaning))]
         else:
             places = meaning.of_state()
             if missing := [name for name in COLUMNS if name not in places]:
@@ -185,6 +186,14 @@ def _numbers(key: str, text: str) -> list[str]:
         remedy = _POINT if len(numbers) > counts[0] or _DECIMAL_COMMAS.match(text) else "Give each of them."
         raise InputError(f"{key} must be {counts[0]} numbers; got {quoted(text)}.", remedy)
     return numbers
+
+
+def _parts(header: observed_columns.Header) -> list[int]:
+    """The places of quantities of which a component is missing, which beside a whole state are not read."""
+    if not {"omega", "gamma"} <= header.places.keys():
+        return []
+    parts = (part for name, part in header.places.items() if len(part) < WIDTHS.get(name, 3))
+    return [place for part in parts for place in part.values()]
 
 
 def unread(names: Sequence[str], header: Sequence[str]) -> list[str]:
