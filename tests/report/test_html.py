@@ -258,7 +258,7 @@ def test_work_and_precision_says_what_is_faster_and_what_failed(pages: dict[str,
     assert "peer:A" in pages["report"].text
     assert not section.legend
     euler, lagrange = section.pictures
-    assert all(f">{name}</text>" in euler.svg for name in ("heyoka double", "peer:A", "peer:B"))
+    assert all(f">{name}</text>" in euler.svg for name in ("heyoka double", "peer:A", "peer:B, × aborted"))
     assert all(f">{name}</text>" in lagrange.svg for name in ("cyrk:DOP853", "splitting:4"))
     assert "peer:B: aborted (1)." in euler.description
     assert section_of("work-precision", Report("", {}, {}, [row()])) is None

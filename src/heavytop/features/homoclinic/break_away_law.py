@@ -123,8 +123,9 @@ def escape_times(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         "Escape times",
         [
             "A homoclinic motion tends to a saddle, which multiplies every rounding error by e^(rate·|t|). No "
-            "integrator stays on it: more digits buy time in proportion. Rate: the growth rate at the saddle. Dashed: "
-            "the law, ln 2 / rate time units per bit, through the mean of the points."
+            "integrator stays on it: more digits buy time in proportion. It has escaped where Ω is off by α/1000, "
+            "α being the angular velocity that it tends to, or the largest component of Ω at the start. Rate: the "
+            "growth rate at the saddle. Dashed: the law, ln 2 / rate time units per bit, through the points' mean."
         ],
         columns=["case", "escape |t| per format", "slope (time per bit)", "ln 2 / rate"],
         place=40,

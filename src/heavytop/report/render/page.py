@@ -412,12 +412,16 @@ def _end(row: Row) -> float:
 
 
 def digits_until(row: Row) -> str:
-    """``9.2 to 1e5``; ``lost 400–600`` where all are lost between these samples; * where no reference is proven."""
+    """``9.2 to 1e5``; ``lost by 80`` where none is left; ``lost 400–600`` where all are lost between these samples; *
+    where no reference is proven.
+    """
     kept, end = digits_kept(row), _end(row)
     assert kept is not None
     exponent = math.floor(end + 1e-9) if math.isfinite(end) else 0
     time = f"{10**end:.3g}" if exponent < 3 else f"{10 ** (end - exponent):.2g}e{exponent}"
-    digits = _lost(row) if row.reference.until else f"{digits_text(kept)} to {time}{_unproven(row)}"
+    right = digits_text(kept)
+    digits = f"lost by {time}" if right == "0.0" else f"{right} to {time}"
+    digits = _lost(row) if row.reference.until else digits + _unproven(row)
     return digits + _digits_of_attitude(row)
 
 

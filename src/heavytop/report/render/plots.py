@@ -115,7 +115,8 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
             "Each error in units of ε = 2^(1 − bits) of its own format, so that all formats share one scale: 10⁶ means "
             "that six digits are lost. Of the first integrals the one that drifts farthest at any sample is drawn. One "
             "that holds does not prove that the motion is right: the distance from the true motion stands beside it.",
-            "A shade around a curve is the interval in which rounding noise alone moves it.",
+            "A shade around a curve is the interval in which rounding noise alone moves it. Where no integrator is "
+            "named it is heyoka.",
         ],
         columns=["case", "run", "quantity", "largest", "last |t|", "last", "law", "exponent", "digits gone at |t|"],
         place=30,
@@ -137,8 +138,9 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         section.legend[_FITTED.label] = section.legend.pop(_FITTED.label)
         section.notes.append(
             "Dashed, and in words at its end: the fitted law of growth with its exponent over the span that was "
-            "fitted, and the 95 % interval as a fan. The rate of an exponential is the median over the starts; the "
-            "root mean square follows the fastest of them."
+            "fitted; the shade around a dashed line is its 95 % interval. The rate of an exponential is the median "
+            "over the starts; the root mean square follows the fastest of them. Digits are gone where the root mean "
+            "square is a tenth of the motion's size, reached or by the law."
         )
     return section
 
@@ -192,7 +194,7 @@ def _curve(section: Section, chart: _Chart, case: str, key: Key, row: Row, quant
 
 def _thinned(rows: Iterable[Row]) -> list[str]:
     """A sentence where curves have fewer samples than their runs; none where they have all."""
-    counts = {(len(series.times), row.samples) for row in rows for series in row.series.values() if series.times}
+    counts = {(max(len(held.times) for held in row.series.values()), row.samples) for row in rows if row.series}
     fewer = [pair for pair in counts if pair[0] < pair[1]]
     if not fewer:
         return []
