@@ -132,16 +132,14 @@ def _lead_cells(lead: Lead, source: str) -> list[str]:
 
 
 def _picture(lines: Sequence[tuple[str, WorkPrecisionLine]], colours: dict[str, int], title: str, name: str) -> Picture:
-    names = [
-        clip(line.label, 30) + (f", {source}" if source else "") + (", × aborted" if line.failures else "")
-        for source, line in lines
-    ]
+    names = [clip(line.label, 30) + (f", {source}" if source else "") for source, line in lines]
+    marked = [name + ", × aborted" * bool(line.failures) for name, (_, line) in zip(names, lines, strict=True)]
     height = max(3.4, 1 + 0.17 * len(lines))
-    axes = new_axes("error (units of Ω and γ)", "time of a run (s)", height, room(names))
+    axes = new_axes("error (units of Ω and γ)", "time of a run (s)", height, room(marked))
     decades(axes.xaxis)
     decades(axes.yaxis)
     alternative, ends = [], []
-    for (source, line), label in zip(lines, names, strict=True):
+    for (source, line), label, at_end in zip(lines, names, marked, strict=True):
         colour = min(colours[line.label], _MOST_COLOURS)
         key = numbered(label, colour, source == "baseline")
         points = sorted((point.log10, math.log10(point.seconds)) for point in line.points)
@@ -156,7 +154,7 @@ def _picture(lines: Sequence[tuple[str, WorkPrecisionLine]], colours: dict[str, 
             alternative.append(f"{key.label}: aborted ({len(line.failures)}).")
         if points or failures:
             x, y = points[-1] if points else (axes.get_xlim()[1], failures[-1])
-            ends.append(End(label, COLOURS[key.colour], x, y))
+            ends.append(End(at_end, COLOURS[key.colour], x, y))
     return finish(axes, title, spoken(alternative, 24), name, ends=ends)
 
 
