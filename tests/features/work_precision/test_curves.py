@@ -208,7 +208,7 @@ def test_the_picture_shows_every_line_and_each_failure_as_a_cross_on_the_edge() 
     looks = [(line.get_color(), line.get_marker()) for line in lines.values()]
     assert len(set(looks)) == len(looks)
     assert picture.svg == drawn(ALL).svg
-    for name in ("heyoka double", "cyrk:DOP853", "sundials:CVODE"):
+    for name in ("heyoka double", "cyrk:DOP853", "sundials:CVODE, × aborted"):
         assert f">{name}</text>" in picture.svg
 
 
