@@ -46,7 +46,7 @@ def variant(row: Row, sources: Iterable[tuple[str, Report]]) -> str:
     return " ".join(part for part in (name, subject.variant, "many starts" if mixed else "") if part)
 
 
-_INTEGRALS = {"gamma_squared": "|γ|²", "momentum_squared": "|M|²", "area": "M·γ"}
+_INTEGRALS = {"gamma_squared": "|γ|²", "momentum_squared": "|M|²", "area": "M·γ", "hess": "Hess' relation"}
 _INTEGRALS |= {f"spin{axis}": f"Ω{axis}" for axis in (1, 2, 3)}  # about an axis of symmetry
 
 
