@@ -342,7 +342,7 @@ def child() -> None:
 
 
 def answer(path: str, system_name: str) -> Answer:
-    """The audit of a file, or the reason that there is none."""
+    """The audit of a file, or why it cannot be audited."""
     try:
         claim = find_claim(path)
         with prefixed(path):

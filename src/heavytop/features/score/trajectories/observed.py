@@ -271,7 +271,7 @@ class GivenTrajectory:
     times: exact, as written.  states: six exact numbers each, rounded to the format; None for a state that is not
     finite.  name, integrator: as the row will call them.  flags: what else the file says.  sha256: of the file.
     format_guessed: whether the format was read off the digits written.  notes: what reading the file took for granted.
-    cut: where the file goes on with rows that are not scored; empty for none.
+    cut: why later rows of the file are not scored; empty where all are.
     observed: what it gives in place of Ω and γ in principal axes; the states are then all numbers of a row, and top and
     start are those in principal axes.
     """
