@@ -304,8 +304,9 @@ def test_seconds_are_those_of_the_clock_here(package: Path) -> None:
     passed = perf_counter() - began
     assert {name: row.reference.reason for name, row in found.items() if row.outcome != "success"} == {}
     for name, row in found.items():
-        least = 0.2 if name in ("slow", "slow_compiling", "later") else 1e-4
-        assert least / 10 <= row.seconds["least"] <= row.seconds["run"], name
+        # half of what it slept: the clock leaves out time without a processor, some of it before and after the sleep
+        least = 0.01 if name in ("slow", "slow_compiling", "later") else 1e-5
+        assert least <= row.seconds["least"] <= row.seconds["run"], name
     assert sum(row.seconds["compile"] + row.seconds["run"] for row in found.values()) <= passed
 
 
