@@ -16,7 +16,7 @@ from flint import arb, fmpq_mpoly
 from heavytop.features.claims.algebra.elliptic import JACOBI, modulus, wpinverse
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Assumptions, Field, SolvedRelation
-from heavytop.features.claims.algebra.ring import Unprovable, used
+from heavytop.features.claims.algebra.ring import Unprovable, used, where_provable
 from heavytop.features.claims.algebra.signs import Sign
 from heavytop.features.claims.algebra.structure import Defined, at_values, rationals, sign_of
 
@@ -68,12 +68,10 @@ class Need:
         text = self.shown or self.kind.value.format(as_text(self.expression))
         return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
 
+    @where_provable(None)
     def is_met(self, values: Mapping[sympy.Symbol, Fraction]) -> bool | None:
         """True or False where that is certain at exact values of the symbols; None where a ball cannot tell."""
-        try:
-            ball = evaluate(self.expression, values, _BITS)
-        except Unprovable:
-            return None
+        ball = evaluate(self.expression, values, _BITS)
         if not ball.is_finite():
             return None
         e = self.expression
@@ -169,18 +167,16 @@ def conditions_of(expressions: Iterable[sympy.Expr]) -> frozenset[Need]:
     return frozenset(needs)
 
 
+@where_provable(None)
 def is_exactly_zero(expression: sympy.Expr, values: Mapping[sympy.Symbol, Fraction]) -> bool | None:
     """Whether it is 0 at exact values: True and False are proofs, None is not decided.
 
     Polynomials are computed in fractions: what is off by 1e-200 is off.
     """
-    from heavytop.features.claims.algebra.fields import Assumptions, Field
-
     if not all(need.is_met(values) for need in conditions_of([expression])):
         return None
-    exact = rationals(values)
     try:
-        value = at_values(expression, exact)
+        value = at_values(expression, rationals(values))
     except ValueError:
         # sympy cannot take the root of some numbers of hundreds of digits
         return None
@@ -189,11 +185,7 @@ def is_exactly_zero(expression: sympy.Expr, values: Mapping[sympy.Symbol, Fracti
     ball: arb = evaluate(expression, values, _BITS)
     if ball.is_finite() and not ball.contains(0):
         return False
-    try:
-        number = Field(Assumptions(sympy.Dummy("t", real=True)), [value])
-    except Unprovable:
-        return None
-    return True if number.vanishes(value) else None
+    return Field(Assumptions(sympy.Dummy("t", real=True)), [value]).vanishes(value) or None
 
 
 # Conditions that are 0, over the real numbers: simpler conditions that hold together at exactly the same points.
@@ -382,14 +374,13 @@ def _factors_with_zeros(field: Field, p: fmpq_mpoly) -> list[fmpq_mpoly]:
     factors = [factor for factor, _ in signs.factors(p)[1] if not signs.of(factor).strict]
     isolated = [factor for factor in factors if _is_zero_at_origin_alone(factor)]
     others = [factor for factor in factors if factor not in isolated]
-    # a factor that is 0 at the origin alone adds nothing to one that is 0 there
-    return [*others, *(factor for factor in isolated if not any(_is_zero_there(other, factor) for other in others))]
 
+    def adds_something(form: fmpq_mpoly) -> bool:
+        """A factor that is 0 at the origin alone adds nothing to one that is 0 there."""
+        terms = [other.to_dict() for other in others]
+        return not any(all(any(monomial[index] for index in used(form)) for monomial in term) for term in terms)
 
-def _is_zero_there(p: fmpq_mpoly, form: fmpq_mpoly) -> bool:
-    """``p`` is 0 where the generators of ``form`` are."""
-    indices = used(form)
-    return all(any(monomial[index] for index in indices) for monomial in p.to_dict())
+    return [*others, *filter(adds_something, isolated)]
 
 
 def _is_zero_at_origin_alone(p: fmpq_mpoly) -> bool:
@@ -494,11 +485,9 @@ def _taylor(
                 derivative = sympy.diff(derivative, x)
 
 
+@where_provable(False)
 def is_never_zero(e: sympy.Expr, assumptions: Assumptions) -> bool:
     """By the algebra, for all parameters that the assumptions admit."""
-    try:
-        field = Field(assumptions, [e])
-        value = field.enter(e)
-    except Unprovable:
-        return False
+    field = Field(assumptions, [e])
+    value = field.enter(e)
     return field.tower.sign(value).strict or field.never_zero_on_relations(value.numerator)

@@ -21,7 +21,7 @@ from heavytop.features.claims.algebra.elliptic import FREE, JACOBI, WEIERSTRASS
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.functions import INVERSE, Refine, Transcendental
 from heavytop.features.claims.algebra.rational import Tower, forces_zero
-from heavytop.features.claims.algebra.ring import Quotient, Unprovable, used
+from heavytop.features.claims.algebra.ring import Quotient, Unprovable, used, where_provable
 from heavytop.features.claims.algebra.signs import NUMBER_BITS, UNKNOWN, Sign
 from heavytop.features.claims.algebra.structure import Defined
 
@@ -163,30 +163,24 @@ class Field:
         """True only where the expression is proven to be 0 wherever no divisor of the tower is."""
         return self.vanishes(expression) or self.is_forced(expression, radical=True)
 
+    @where_provable(False)
     def vanishes(self, expression: sympy.Expr) -> bool:
         """True only where the expression reduces to 0, whatever the relations of the claim say."""
-        try:
-            return not self.enter(expression).numerator
-        except Unprovable:
-            return False
+        return not bool(self.enter(expression).numerator)
 
+    @where_provable(False)
     def is_forced(self, expression: sympy.Expr, *, radical: bool, simpler: Callable[[Any], Any] = lambda p: p) -> bool:
         """The relations of the claim force it to be 0: it is their combination with factors of this field.
 
         radical: a power of it is, which proves as much at each point, but not that the flow keeps a relation.
         simpler: the same polynomial where more is known of its generators.
         """
-        try:
-            return self._forces([], simpler(self.enter(expression).numerator), radical=radical)
-        except Unprovable:
-            return False
+        return self._forces([], simpler(self.enter(expression).numerator), radical=radical)
 
+    @where_provable(False)
     def never_zero_on_relations(self, *zeros: fmpq_mpoly) -> bool:
         """True only where the relations of the claim exclude each other and that these polynomials are 0."""
-        try:
-            return self._forces(list(zeros), self.tower.one, radical=False)
-        except Unprovable:
-            return False
+        return self._forces(list(zeros), self.tower.one, radical=False)
 
     def _forces(self, zeros: list[fmpq_mpoly], p: fmpq_mpoly, *, radical: bool) -> bool:
         """The relations of the claim and ``zeros`` do, also where a factor that is never 0 has to be divided out."""
@@ -197,29 +191,27 @@ class Field:
         if forces_zero([*relations, *roots], p, radical=radical):
             return True
         # what stays positive along a motion may be 0 on another
-        never_zero = [q for q in self.tower.signs.never_zero(relations) if self._is_constant_by_name(q)]
+        names = self.assumptions.parameters.union(self.assumptions.positive)
+        never_zero = [q for q in self.tower.signs.never_zero(relations) if self.symbols(q) <= names]
         if never_zero and forces_zero([*relations, *roots], p, radical=radical, never_zero=never_zero):
             return True
-        # a parameter is 0 or it is not
+        # a parameter, in a relation between parameters, is 0 or it is not
+        indices = set().union(*(used(relation) for relation in relations if self._is_of_parameters(relation)))
         return any(
             forces_zero([*relations, *roots], p, radical=radical, never_zero=[*never_zero, self.tower.gens[index]])
             and forces_zero([*self._where_zero(relations, index), *roots], p, radical=radical, never_zero=never_zero)
-            for index in self._open_parameters(relations)
+            for index in sorted(indices)
+            if not self.tower.generators[index].strict
         )
 
-    def _is_constant_by_name(self, p: fmpq_mpoly) -> bool:
-        symbols = set().union(*(self.meaning(index).free_symbols for index in used(p)))
-        return symbols <= self.assumptions.parameters.union(self.assumptions.positive)
+    def symbols(self, p: fmpq_mpoly) -> set[sympy.Symbol]:
+        """The symbols in the generators of a polynomial."""
+        return set().union(*(self.meaning(index).free_symbols for index in used(p)))
 
     def _is_of_parameters(self, p: fmpq_mpoly) -> bool:
         generators = self.tower.generators
         names = self.assumptions.parameters
         return all(generators[i].kind == "symbol" and generators[i].meaning in names for i in used(p))
-
-    def _open_parameters(self, relations: list[fmpq_mpoly]) -> list[int]:
-        """Parameters that may be 0, in the relations between parameters."""
-        indices = set().union(*(used(relation) for relation in relations if self._is_of_parameters(relation)))
-        return [index for index in sorted(indices) if not self.tower.generators[index].strict]
 
     def _where_zero(self, relations: list[fmpq_mpoly], index: int) -> list[fmpq_mpoly]:
         """The relations where a parameter is 0; those between parameters without powers and what is never 0."""
@@ -227,19 +219,16 @@ class Field:
         zeros = [self.tower.gens[index]]
         for relation in relations:
             if self._is_of_parameters(relation):
-                product = self.tower.one
-                for factor, _ in self.tower.by_power(relation, index).get(0, zero).factor()[1]:
-                    product = product if signs.of(factor).strict else product * factor
-                relation = product if self.tower.by_power(relation, index).get(0, zero) else zero
+                left = self.tower.by_power(relation, index).get(0, zero)
+                factors = (factor for factor, _ in left.factor()[1] if not signs.of(factor).strict)
+                relation = prod(factors, start=self.tower.one) if left else zero
             zeros.append(relation)
         return [relation for relation in zeros if relation]
 
+    @where_provable(False)
     def vanishes_on(self, expression: sympy.Expr, zero: sympy.Expr) -> bool:
         """True only where the expression is a multiple of the polynomial ``zero``, off the divisors of the tower."""
-        try:
-            return not divmod(self.enter(expression).numerator, self.enter(zero).numerator)[1]
-        except Unprovable:
-            return False
+        return bool(not divmod(self.enter(expression).numerator, self.enter(zero).numerator)[1])
 
     def is_constant(self, value: Quotient) -> bool:
         """True where only generators that are constant in time are left."""
@@ -421,12 +410,9 @@ class Regularity:
             return ""
         return f"{self._text(value.numerator, value.denominator)} {wanted} is not shown"
 
+    @where_provable("an intermediate value")
     def _text(self, numerator: fmpq_mpoly, denominator: Any = None) -> str:
         tower = self._field.tower
-        try:
-            text = str(
-                self._field.expression(Quotient(numerator, tower.one if denominator is None else denominator, tower))
-            )
-        except Unprovable:
-            text = "an intermediate value"
+        quotient = Quotient(numerator, tower.one if denominator is None else denominator, tower)
+        text = str(self._field.expression(quotient))
         return text if len(text) <= _SHOWN else text[: _SHOWN - 1] + "…"

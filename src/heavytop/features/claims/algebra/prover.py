@@ -26,7 +26,7 @@ from heavytop.features.claims.algebra.conditions import (
 )
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Field, Regularity
-from heavytop.features.claims.algebra.ring import Quotient, Unprovable, used
+from heavytop.features.claims.algebra.ring import Quotient, Unprovable, used, where_provable
 from heavytop.features.claims.algebra.signs import NUMBER_BITS, PLUS, value_of
 from heavytop.features.claims.algebra.statement import Domain, Flow, Point, Setting, Statement
 from heavytop.features.claims.algebra.structure import sign_of
@@ -96,13 +96,11 @@ class Region:
         value = point[a.variable] * a.variable_sign
         return value > 0 or (value == 0 and not (a.strict and a.variable_sign))
 
+    @where_provable(False)
     def vanishes(self, expression: sympy.Expr) -> bool:
         """0 by the algebra, and by what inverse functions add up to."""
-        try:
-            p = self.field.enter(expression).numerator
-            return not p or not self._arcs.without(p)
-        except Unprovable:
-            return False
+        p = self.field.enter(expression).numerator
+        return not (p and self._arcs.without(p))
 
     def is_forced(self, expression: sympy.Expr, *, radical: bool) -> bool:
         """0 by the relations of the claim, as in :meth:`~heavytop.features.claims.algebra.fields.Field.is_forced`."""
@@ -110,28 +108,23 @@ class Region:
 
     def is_nowhere_zero(self, p: fmpq_mpoly) -> bool:
         """0 nowhere on the region (of a first integral: nowhere on the part that the flow keeps)."""
-        return self.field.tower.signs.of(p).strict or self._is_apart(p) or self.is_kept(p)
-
-    def _is_apart(self, p: fmpq_mpoly) -> bool:
-        return self.field.never_zero_on_relations(p)
+        return self._is_never_zero(p) or self.is_kept(p)
 
     @_answered_once
+    @where_provable(False)
     def is_kept(self, p: fmpq_mpoly) -> bool:
         """p' = c p along the flow, with p and c continuous, off a set without interior: p keeps its sign."""
         flow = self._flow
         if flow is None:
             return False
-        try:
-            expression = self.field.expression(self.field.tower.polynomial(p))
-            if not expression.free_symbols & flow.state:
-                return False
-            rate = flow.rate(expression)
-            field = Field(self.field.assumptions, [expression, rate])
-            divisors = list(field.tower.divisors.values())
-            value = field.enter(expression)
-            cofactor = field.enter(rate) / value
-        except Unprovable:
+        expression = self._expression(p)
+        if not expression.free_symbols & flow.state:
             return False
+        rate = flow.rate(expression)
+        field = Field(self.field.assumptions, [expression, rate])
+        divisors = list(field.tower.divisors.values())
+        value = field.enter(expression)
+        cofactor = field.enter(rate) / value
         regularity = Regularity(field)
         if regularity.obstacle(cofactor) or regularity.obstacle(value):
             return False
@@ -205,17 +198,16 @@ class Region:
             if bound.free_symbols & near
         )
 
+    @where_provable(False)
     def _is_nonzero_at_some_state(self, p: fmpq_mpoly, flow: Flow) -> bool:
         """A polynomial that is not 0 all over |γ| = 1 is 0 on no open part of it."""
-        try:
-            expression = self.field.expression(self.field.tower.polynomial(p)).xreplace(dict(flow.names))
-            values = {symbol: _SOME_STATE.get(str(symbol)) for symbol in expression.free_symbols}
-            others = (Fraction(2 * n + 7, 3 * n + 5) for n in range(len(values)))
-            return not evaluate(
-                expression, {s: next(others) if v is None else v for s, v in values.items()}, NUMBER_BITS
-            ).contains(0)
-        except Unprovable:
-            return False
+        expression = self._expression(p).xreplace(dict(flow.names))
+        others = (Fraction(2 * n + 7, 3 * n + 5) for n in range(len(expression.free_symbols)))
+        values = {s: _SOME_STATE.get(str(s)) or next(others) for s in expression.free_symbols}
+        return not evaluate(expression, values, NUMBER_BITS).contains(0)
+
+    def _expression(self, p: fmpq_mpoly) -> sympy.Expr:
+        return self.field.expression(self.field.tower.polynomial(p))
 
     def _is_nonzero_at(self, p: fmpq_mpoly, point: Point) -> bool:
         meanings = {index: self.field.meaning(index) for index in used(p)}
@@ -260,43 +252,32 @@ class Region:
     def _always(self) -> tuple[sympy.Expr, ...]:
         return () if self._flow is None else self._flow.always
 
+    @where_provable("")
     def _discharge(self, need: Need) -> str:
         if need.kind.is_met_by(sign_of(need.expression)):
             return _EVERYWHERE
-        try:
-            value = self.field.enter(need.expression)
-        except Unprovable:
-            return ""
-        sign = self.field.tower.sign(value)
-        apart = (
-            need.kind is ConditionKind.NONZERO and bool(value.numerator) and self._factors_nowhere_zero(value.numerator)
-        )
-        if apart or need.kind.is_met_by(sign):
+        value = self.field.enter(need.expression)
+        factors = self._factors(value.numerator) if need.kind is ConditionKind.NONZERO and value.numerator else []
+        apart = bool(factors) and all(map(self._is_never_zero, factors))
+        if apart or need.kind.is_met_by(self.field.tower.sign(value)):
             return _EVERYWHERE
-        if self.keeps_sign(value, need.kind):
-            return KEPT
-        return ""
+        return KEPT if self.keeps_sign(value, need.kind) else ""
 
     def keeps_sign(self, value: Quotient, kind: ConditionKind) -> bool:
         """Along the flow: its numerator does, and its denominator, unless only that it is not 0 is asked."""
         if self._flow is None or not value.numerator or not self.is_kept(value.numerator):
             return False
-        below = self.field.tower.signs.factors(value.denominator)[1]
-        return kind is ConditionKind.NONZERO or all(self.is_nowhere_zero(factor) for factor, _ in below)
+        return kind is ConditionKind.NONZERO or all(map(self.is_nowhere_zero, self._factors(value.denominator)))
 
-    def _factors_nowhere_zero(self, p: fmpq_mpoly) -> bool:
-        return all(
-            self.field.tower.signs.of(f).strict or self._is_apart(f) for f, _ in self.field.tower.signs.factors(p)[1]
-        )
+    def _is_never_zero(self, p: fmpq_mpoly) -> bool:
+        return self.field.tower.signs.of(p).strict or self.field.never_zero_on_relations(p)
 
+    @where_provable(False)
     def is_removable(self, need: Need) -> bool:
         """It fails, for any values of the parameters, on a set without interior at most."""
         if self._setting.relations:  # on them it may fail all over
             return False
-        try:
-            value = self.field.enter(need.expression)
-        except Unprovable:
-            return False
+        value = self.field.enter(need.expression)
         weak = need.kind is ConditionKind.NONZERO or self.field.tower.sign(value).value > 0
         return weak and bool(value.numerator) and all(map(self._is_thin_for_each, self._factors(value.numerator)))
 
@@ -311,11 +292,15 @@ class Region:
             return all(map(self._is_thin_for_each, self._factors(square)))
         if self.field.tower.signs.of(p).strict:
             return True
-        symbols = set().union(*(self.field.meaning(index).free_symbols for index in used(p)))
         if not self.is_for_no_parameters(p):
             return False
-        has_parameters = bool(symbols & self._setting.parameters)
-        return self.is_zero_nowhere_dense(p) or (has_parameters and self._is_analytic(p))
+        parameters = self._setting.parameters
+        return self.is_zero_nowhere_dense(p) or (
+            # analytic in what moves, over a domain in one piece
+            bool(self.field.symbols(p) & parameters)
+            and self.is_connected(used(p), fixed=parameters)
+            and not self.everywhere.obstacle_of_generators(used(p), analytic=True)
+        )
 
     def _square(self, p: fmpq_mpoly) -> fmpq_mpoly | None:
         """The radicand of a polynomial that is a root by itself; None of another."""
@@ -323,19 +308,10 @@ class Region:
         alone = not others and p == tower.gens[index] and tower.generators[index].kind == "root"
         return tower.squares[index] if alone else None
 
-    def _is_analytic(self, p: fmpq_mpoly) -> bool:
-        """In what moves, over a domain in one piece."""
-        return self.is_connected(used(p), fixed=self._setting.parameters) and not (
-            self.everywhere.obstacle_of_generators(used(p), analytic=True)
-        )
-
+    @where_provable(False)
     def is_for_no_parameters(self, p: fmpq_mpoly) -> bool:
         """True only where p is 0 all over the region for no values of the parameters."""
-        flow, domain = self._statement.flow, self._statement.domain
-        try:
-            e = self.field.expression(self.field.tower.polynomial(p))
-        except Unprovable:
-            return False
+        flow, domain, e = self._statement.flow, self._statement.domain, self._expression(p)
         if flow is not None:
             state = {symbol: sympy.Rational(_SOME_STATE[str(symbol)]) for symbol in flow.state - flow.names.keys()}
             at_rest = {symbol: value for symbol, value in state.items() if str(symbol).startswith("gamma")}
@@ -352,8 +328,7 @@ class Region:
         open_part = need.expression if need.expression.free_symbols <= parameters else None
         if open_part is None and need.kind is ConditionKind.NONZERO:
             with suppress(Unprovable):
-                factors = self._factors(self.field.enter(need.expression).numerator)
-                parts = [self.field.expression(self.field.tower.polynomial(f)) for f in factors]
+                parts = [*map(self._expression, self._factors(self.field.enter(need.expression).numerator))]
                 alone = [part for part in parts if part.free_symbols <= parameters]
                 open_part = sympy.Mul(*(part for part in alone if not is_never_zero(part, self.field.assumptions)))
         if open_part is None or not open_part.free_symbols:
@@ -376,20 +351,15 @@ class Region:
         for text, p in list(self.field.tower.divisors.items()):
             if (forced, text) not in self._divisors:
                 self._divisors[forced, text] = (
-                    self._divisor_is_never_zero(p) if forced else self.is_zero_nowhere_dense(p)
+                    all(self._is_never_zero(factor) or self._is_excluded(factor) for factor in self._factors(p))
+                    if forced
+                    else self.is_zero_nowhere_dense(p)
                 )
             if not self._divisors[forced, text]:
                 try:
-                    yield str(self.field.expression(self.field.tower.polynomial(p)))
+                    yield str(self._expression(p))
                 except Unprovable:
                     yield text
-
-    def _divisor_is_never_zero(self, p: fmpq_mpoly) -> bool:
-        tower = self.field.tower
-        return all(
-            tower.signs.of(factor).strict or self._is_apart(factor) or self._is_excluded(factor)
-            for factor, _ in tower.signs.factors(p)[1]
-        )
 
 
 _CONTINUOUS = "the formulas are real and continuous on the whole domain"

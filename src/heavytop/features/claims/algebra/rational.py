@@ -63,15 +63,13 @@ def _as_sum(tower: Tower, p: fmpq_mpoly, index: int, depth: int) -> Quotient | N
     d = _plain_root(tower, norm, any_sign=s > 0)
     if d is None or d.denominator != tower.one:
         return None
-    halves = [_simpler_root(tower, (a + sign * d.numerator) / 2, depth - 1) for sign in (1, -1)]
+    halves = []
+    for radicand in ((a + d.numerator) / 2, (a - d.numerator) / 2):
+        plain = _plain_root(tower, radicand)
+        halves.append(denested(tower, radicand, depth - 1) if plain is None else plain)
     if halves[0] is None or halves[1] is None:
         return None
     return halves[0] + halves[1] * s
-
-
-def _simpler_root(tower: Tower, p: fmpq_mpoly, depth: int) -> Quotient | None:
-    plain = _plain_root(tower, p)
-    return denested(tower, p, depth) if plain is None else plain
 
 
 def _plain_root(tower: Tower, p: fmpq_mpoly, *, any_sign: bool = False) -> Quotient | None:
@@ -79,31 +77,24 @@ def _plain_root(tower: Tower, p: fmpq_mpoly, *, any_sign: bool = False) -> Quoti
     if not p:
         return tower.number(0)
     constant, factors = tower.signs.factors(p)
-    result = tower.one
+    result, signed = tower.one, []
     for factor, power in factors:
-        sign = 1 if _needs_no_sign(power, any_sign) else tower.signs.of(factor).value
-        if power % 2:
-            constant = constant * sign
-            known = tower.known_root(factor * sign) if sign else None
-            is_nested = bool(tower.squares.keys() & used(factor))
-            if not sign or (known is None and is_nested):
-                return None
-        elif not sign:
+        # an even power of a square comes out of the root, as does any where the sign of the root may be either
+        needs_no_sign = power % 4 == 0 or (any_sign and power % 2 == 0)
+        sign = 1 if needs_no_sign else tower.signs.of(factor).value
+        is_nested = power % 2 and bool(tower.squares.keys() & used(factor))
+        if not sign or (is_nested and tower.known_root(factor * sign) is None):
             return None
+        constant = constant * sign if power % 2 else constant
+        signed.append((factor * sign, power))
     if constant < 0:
         return None
     root = tower.root_of_number(constant)
-    for factor, power in factors:
-        sign = 1 if _needs_no_sign(power, any_sign) else tower.signs.of(factor).value
-        result = tower.times(result, tower.raised(factor * sign, int(power) // 2))
+    for factor, power in signed:
+        result = tower.times(result, tower.raised(factor, int(power) // 2))
         if power % 2:
-            result = tower.times(result, tower.gens[tower.root_of(factor * sign)])
+            result = tower.times(result, tower.gens[tower.root_of(factor)])
     return root * tower.polynomial(result)
-
-
-def _needs_no_sign(power: Any, any_sign: bool) -> bool:
-    """An even power of a factor comes out of the root, as does any where the sign of the root may be either."""
-    return bool(power % 4 == 0 or (any_sign and power % 2 == 0))
 
 
 def _through_conjugate(tower: Tower, p: fmpq_mpoly) -> Quotient | None:

@@ -208,7 +208,8 @@ class _Parser(Descent):
                     raise self._error("a division by 0")
                 needs = part.needs | condition("/", (part.expression,))
                 part = Formula(1 / part.expression, part.size, needs)
-            size = _multiplied(total.size, part.size)
+            a, b = total.size, part.size
+            size = ExpressionBounds(a.nodes + b.nodes + 1, a.bits + b.bits, a.degree + b.degree, a.terms * b.terms)
             self._check(size)
             total = Formula(total.expression * part.expression, size, total.needs | part.needs)
         return total
@@ -304,10 +305,6 @@ class _Parser(Descent):
 
 def _added(a: ExpressionBounds, b: ExpressionBounds) -> ExpressionBounds:
     return ExpressionBounds(a.nodes + b.nodes + 1, max(a.bits, b.bits) + 1, max(a.degree, b.degree), a.terms + b.terms)
-
-
-def _multiplied(a: ExpressionBounds, b: ExpressionBounds) -> ExpressionBounds:
-    return ExpressionBounds(a.nodes + b.nodes + 1, a.bits + b.bits, a.degree + b.degree, a.terms * b.terms)
 
 
 # What a file assumes of its parameters: ``assume = ["alpha > 0", "I1 > I3", "k < 1", "g != 0"]``.

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
 
 from flint import Ordering, fmpq, fmpq_mpoly, fmpq_mpoly_ctx
 
@@ -19,6 +21,28 @@ _MAX_QUOTIENT = 1_500
 
 class Unprovable(HeavyTopError):
     """An expression that the exact algebra cannot carry: it leaves the verdict to the balls, and so undecided."""
+
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+
+def where_provable(otherwise: Any) -> Callable[[Callable[_P, _T]], Callable[_P, _T]]:
+    """The answer of a function, and this one where the algebra cannot carry what it is about."""
+
+    def decorated(function: Callable[_P, _T]) -> Callable[_P, _T]:
+        unknown: _T = otherwise
+
+        @wraps(function)
+        def answer(*args: _P.args, **kwargs: _P.kwargs) -> _T:
+            try:
+                return function(*args, **kwargs)
+            except Unprovable:
+                return unknown
+
+        return answer
+
+    return decorated
 
 
 def used(p: fmpq_mpoly) -> set[int]:

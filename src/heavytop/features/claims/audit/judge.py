@@ -25,7 +25,7 @@ from heavytop.features.claims.algebra.conditions import conditions_of, is_exactl
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Field
 from heavytop.features.claims.algebra.prover import Condition, Prover
-from heavytop.features.claims.algebra.ring import Quotient, Unprovable
+from heavytop.features.claims.algebra.ring import Quotient, where_provable
 from heavytop.features.claims.algebra.statement import Formulas, Setting, Statement
 from heavytop.features.claims.library.entry import Entry
 
@@ -244,12 +244,10 @@ def _power_of_2(number: arb) -> int:
     return int(exponent) + int(mantissa).bit_length() if mantissa else 0
 
 
+@where_provable(None)
 def _ball(residual: sympy.Expr, values: Mapping[sympy.Symbol, Fraction], bits: int) -> arb | None:
     """The residual at one place; None where it is undefined there."""
-    try:
-        ball = evaluate(residual, values, bits)
-    except Unprovable:
-        return None
+    ball = evaluate(residual, values, bits)
     return ball if ball.is_finite() else None
 
 
@@ -268,18 +266,16 @@ def _bound(statement: Statement, prover: Prover) -> str:
     return f"|residual| < {radius_text(radius_of(arb(0, largest)))} at the sample points"
 
 
+@where_provable(None)
 def _closed_form(statement: Statement, setting: Setting, field_: Field) -> str | None:
     """The residual as (constant) · (part), such as -(k/2)·gamma3; else as it stands, if it is short."""
-    try:
-        residual = field_.enter(statement.residual)
-        for name, part in (("", sympy.Integer(1)), *setting.parts.get(statement.branch, ())):
-            value = field_.enter(part)
-            factor = residual / value if value.numerator else None
-            if factor is not None and field_.is_constant(factor):
-                return _product_text(_constant_text(factor, setting, field_), name)
-        text = str(field_.expression(residual))
-    except Unprovable:
-        return None
+    residual = field_.enter(statement.residual)
+    for name, part in (("", sympy.Integer(1)), *setting.parts.get(statement.branch, ())):
+        value = field_.enter(part)
+        factor = residual / value if value.numerator else None
+        if factor is not None and field_.is_constant(factor):
+            return _product_text(_constant_text(factor, setting, field_), name)
+    text = str(field_.expression(residual))
     return text if len(text) <= _LONGEST else None
 
 

@@ -18,7 +18,7 @@ import sympy
 from heavytop.errors import InputError
 from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.prover import Condition
-from heavytop.features.claims.algebra.ring import Unprovable
+from heavytop.features.claims.algebra.ring import where_provable
 from heavytop.features.claims.algebra.statement import ALL, TIME, Statement
 from heavytop.features.claims.algebra.structure import rationals
 from heavytop.features.claims.audit.judge import StatementVerdict, verdict_of
@@ -97,13 +97,11 @@ class UserStability(UserMotion):
         return any(sign(e) == 1 for e in (-a, -b, 4 * b - a**2))
 
 
+@where_provable(None)
 def _sign(assumptions: Assumptions, e: sympy.Expr) -> int | None:
     """0 or 1 where the expression is proven to be 0, or positive, and defined all over the domain; else None."""
-    try:
-        field = Field(assumptions, [sympy.sympify(e)])
-        value = field.enter(sympy.sympify(e))
-    except Unprovable:
-        return None
+    field = Field(assumptions, [sympy.sympify(e)])
+    value = field.enter(sympy.sympify(e))
     sign, signs = field.tower.sign(value), field.tower.signs
     if not all(signs.of(p).strict for p in (value.denominator, *field.tower.divisors.values())):
         return None

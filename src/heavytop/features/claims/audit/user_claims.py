@@ -23,7 +23,7 @@ from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.prover import shortest
 from heavytop.features.claims.algebra.reader import Formula, parse
-from heavytop.features.claims.algebra.ring import Unprovable
+from heavytop.features.claims.algebra.ring import where_provable
 from heavytop.features.claims.algebra.statement import AFTER, ALL, TIME, Flow, Formulas, Point, Setting, Statement
 from heavytop.features.claims.algebra.structure import Names, rate_along, rationals
 from heavytop.features.claims.audit.context import (
@@ -351,12 +351,9 @@ class UserIntegral(FileClaim):
         rotor = self.context.rotor
         if rotor is None or not rotor.free_symbols & frozenset(STATE):
             return self.context
-        change = self._rate(GYROSTAT)(rotor)
-        try:
-            is_constant = Field(setting_of(self.context, TIME).assumptions(0), [change]).vanishes(change)
-        except Unprovable:
-            is_constant = False
-        return self.context.with_rotor(rotor, is_constant)
+        change, assumptions = self._rate(GYROSTAT)(rotor), setting_of(self.context, TIME).assumptions(0)
+        vanishes = where_provable(False)(lambda: Field(assumptions, [change]).vanishes(change))
+        return self.context.with_rotor(rotor, vanishes())
 
     @property
     def _table(self) -> IntegralTable:
@@ -494,16 +491,14 @@ def _check_states(table: IntegralTable) -> None:
             )
 
 
+@where_provable(False)
 def _is_constant(
     rate: sympy.Expr, assumptions: Assumptions, samples: Sequence[Mapping[sympy.Symbol, Fraction]]
 ) -> bool:
     """Whether a rate is proven to be 0 by an algebra that divides by nothing that may be 0."""
-    try:
-        # what is not 0 at a sample need not be taken into the algebra
-        balls = [evaluate(rate, {TIME: Fraction(0), **sample}, _BITS) for sample in samples[:1]]
-        if any(ball.is_finite() and not ball.contains(0) for ball in balls):
-            return False
-        field = Field(assumptions, [rate])
-    except Unprovable:
+    # what is not 0 at a sample need not be taken into the algebra
+    balls = [evaluate(rate, {TIME: Fraction(0), **sample}, _BITS) for sample in samples[:1]]
+    if any(ball.is_finite() and not ball.contains(0) for ball in balls):
         return False
+    field = Field(assumptions, [rate])
     return field.is_zero(rate) and all(field.tower.signs.of(p).strict for p in field.tower.divisors.values())
