@@ -59,9 +59,7 @@ class ClaimLibrary(Tabular, Sequence[Entry]):
     @property
     def changed(self) -> tuple[str, ...]:
         """Ids of the entries whose verdict is another than the expected one, and is one."""
-        return tuple(
-            entry.id for entry in self.entries if self.verdicts[entry.id].verdict not in (entry.expects, _OPEN)
-        )
+        return tuple(e.id for e in self.entries if self.verdicts[e.id].verdict not in (e.expects, _OPEN))
 
     @property
     def undecided(self) -> tuple[str, ...]:
@@ -122,12 +120,7 @@ def claim_library(
     Raises:
         InputError: for a tag that no entry has.
     """
-    listed = library().values() if tag is None else _tagged(arguments.text(tag, "tag"))
+    wanted = None if tag is None else require_tag(arguments.text(tag, "tag"))
     told = arguments.callback(done, "done") or (lambda: None)
-    entries = tuple(listed)
+    entries = tuple(entry for entry in library().values() if wanted is None or wanted in entry.tags)
     return ClaimLibrary(entries, judged(entries, anew=bool(arguments.flag(anew, "anew")), done=told))
-
-
-def _tagged(tag: str) -> list[Entry]:
-    require_tag(tag)
-    return [entry for entry in library().values() if tag in entry.tags]

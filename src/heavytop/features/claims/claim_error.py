@@ -51,19 +51,14 @@ def exact_claim(case: PartialCase, time: Fraction, branch: Branch, bits: int = M
     """
 
     def evaluate(_working: int) -> list[arb]:
-        v = _on_balls(case, time, branch)
+        # at t = 0 (4.2) is exactly 0, and the roots of (4.3), (4.5) must not see a ball that reaches below it
+        data = (ball(case.i1), ball(case.i3), ball(case.c1), ball(time) if time else arb(0))
+        v = partial_case(*data, FUNCTIONS, branch if time else "smooth")
         return [*v.omega, *v.gamma, *((v.phi, v.theta, v.psi) if time else ())]
 
     o1, o2, o3, g1, g2, g3, *angles = to_bits(evaluate, bits)
     phi, theta, psi = angles or [arb("nan")] * 3
     return Values((o1, o2, o3), (g1, g2, g3), phi, theta, psi)
-
-
-def _on_balls(case: PartialCase, time: Fraction, branch: Branch) -> Values[arb]:
-    if time == 0:
-        # (4.2) is exactly 0, and the roots of (4.3), (4.5) must not see a ball that reaches below it
-        return partial_case(ball(case.i1), ball(case.i3), ball(case.c1), arb(0), FUNCTIONS, "smooth")
-    return partial_case(ball(case.i1), ball(case.i3), ball(case.c1), ball(time), FUNCTIONS, branch)
 
 
 @whole_evaluation

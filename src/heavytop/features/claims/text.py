@@ -13,12 +13,15 @@ from rich.text import Text
 from heavytop.features.claims.api import ClaimLibrary
 from heavytop.features.claims.audit.judge import ABOUT, VERDICTS, Audit, StatementVerdict
 from heavytop.features.claims.audit.values import SIZES
-from heavytop.features.claims.library.entry import Entry
 from heavytop.report.document.document import clip
 
 _WIDTH = 80
 _HEADS = {"holds": "Proven", "refuted": "Refuted", "undecided": "Undecided"}
 _STYLES = {"holds": "green", "refuted": "bold red", "undecided": "yellow"}
+
+
+def _verdict(holds: bool | None) -> Text:
+    return Text(VERDICTS[holds], style=_STYLES[VERDICTS[holds]])
 
 
 def claims_text(listing: ClaimLibrary) -> RenderableType:
@@ -28,14 +31,11 @@ def claims_text(listing: ClaimLibrary) -> RenderableType:
         of_verdict = [entry for entry in listing.entries if listing.verdicts[entry.id].verdict == verdict]
         if of_verdict:
             parts += [Text(f"{head}: {len(of_verdict)}", style=_STYLES[verdict])]
-            parts += [line for entry in of_verdict for line in _lines(entry)]
+            for entry in of_verdict:
+                source = f"{', '.join(entry.source.authors)} {entry.source.year}"
+                parts += [Text(f"  {entry.id}"), *map(Text, _folded(f"{entry.title} ({source})", 4))]
             parts.append(Text())
     return Group(*parts, Text("heavytop audit NAME shows the proof or the witness of one."))
-
-
-def _lines(entry: Entry) -> list[Text]:
-    source = f"{', '.join(entry.source.authors)} {entry.source.year}"
-    return [Text(f"  {entry.id}"), *map(Text, _folded(f"{entry.title} ({source})", 4))]
 
 
 def _folded(text: str, indent: int) -> list[str]:
@@ -50,9 +50,8 @@ def unexpected_text(listing: ClaimLibrary) -> RenderableType:
     lines = [Text(total)]
     for entry in off:
         judged = listing.verdicts[entry.id]
-        difference = f"{entry.id}: {judged.verdict}, expected: {entry.expects}" + f"; {judged.reason}" * bool(
-            judged.reason
-        )
+        difference = f"{entry.id}: {judged.verdict}, expected: {entry.expects}"
+        difference += f"; {judged.reason}" if judged.reason else ""
         lines.append(Text(fill(difference, _WIDTH, subsequent_indent="  "), style=_STYLES[judged.verdict]))
     seconds = sum(judged.seconds for judged in listing.verdicts.values())
     return Group(*lines, Text(f"{seconds:.0f} s of audits."))
@@ -63,7 +62,6 @@ def unexpected_text(listing: ClaimLibrary) -> RenderableType:
 
 _WIDEST_TIME = 16
 """Characters of a time; the lines below the table have all of it."""
-_VALUE_STYLES = {True: "green", False: "bold red", None: "yellow"}
 
 
 def values_text(rows: Sequence[StatementVerdict]) -> list[RenderableType]:
@@ -77,11 +75,10 @@ def values_text(rows: Sequence[StatementVerdict]) -> list[RenderableType]:
     for row in rows:
         figures = row.figures or {}
         right = f"{figures['digits_right']} of {figures['digits_printed']}" if "digits_right" in figures else "?"
-        cells = [label(row), clip(row.domain, _WIDEST_TIME), "", figures.get("printed", ""), right]
-        cells += [figures.get("tolerance", "half a unit"), row.residual.removeprefix("off by ")]
-        line: list[RenderableType] = [Text(cell) for cell in cells]
-        line[2] = Text(VERDICTS[row.holds], style=_VALUE_STYLES[row.holds])
-        table.add_row(*line)
+        cells = [figures.get("printed", ""), right, figures.get("tolerance", "half a unit")]
+        cells.append(row.residual.removeprefix("off by "))
+        place = Text(label(row)), Text(clip(row.domain, _WIDEST_TIME))
+        table.add_row(*place, _verdict(row.holds), *map(Text, cells))
     proven = [row for row in rows if row.figures and "proven" in row.figures]
     lines = [Text("Proven: the true number is within the radius of the value.")] if proven else []
     for row in proven:
@@ -112,13 +109,12 @@ minus right, of (1.1) solved for Omega', with the claimed omega and gamma.
 Equations, and alpha and k of the paper: `heavytop docs claim`."""
 _RESIDUAL = 20
 """Characters of a line of a residual: what a terminal of 80 columns leaves to it."""
-_AUDIT_STYLES = {True: "green", False: "bold red", None: "yellow"}
 
 
 def audit_text(report: Audit) -> RenderableType:
     """Verdict, a table of the equations, the witnesses of what is refuted, and why."""
     head = Text(f"{report.claim} as {ABOUT[report.kind]} of {report.system}: ")
-    head.append(report.verdict, style=_AUDIT_STYLES[{"holds": True, "refuted": False}.get(report.verdict)])
+    head.append(report.verdict, style=_STYLES[report.verdict])
     parts: list[RenderableType] = [head]
     if report.source:
         parts.append(Text(report.source))
@@ -157,9 +153,8 @@ def _table(report: Audit) -> Table:
     for name in ("equation", *own, "verdict", "residual", "statement"):
         table.add_column(name, overflow="fold", no_wrap=name not in ("residual", "statement"))
     for row in report.rows:
-        verdict = Text(VERDICTS[row.holds], style=_AUDIT_STYLES[row.holds])
         cells = (Text(value) for value in (_label(row), *(getattr(row, name) for name in own)))
-        table.add_row(*cells, verdict, Text(_in_lines(row.residual)), Text(row.statement))
+        table.add_row(*cells, _verdict(row.holds), Text(_in_lines(row.residual)), Text(row.statement))
     return table
 
 
@@ -217,9 +212,8 @@ def _conditions(report: Audit) -> list[RenderableType]:
                 rows.setdefault((c.discharged, c.text, c.reason), []).append(_label(row))
     lines = []
     for (discharged, text, reason), labels in sorted(rows.items()):
-        state = Text(
-            "discharged" if discharged else "not discharged", style=_AUDIT_STYLES[True if discharged else None]
-        )
+        word, verdict = ("discharged", "holds") if discharged else ("not discharged", "undecided")
+        state = Text(word, style=_STYLES[verdict])
         where = "" if discharged else f" [{', '.join(dict.fromkeys(labels))}]"
         lines.append((state, f"{text} ({reason}){where}"))
     return _indented("Conditions of the proofs (domain: moments of inertia > 0, and `assume`)", lines)

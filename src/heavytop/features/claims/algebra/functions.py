@@ -88,7 +88,9 @@ class Transcendental:
         def make(base: Quotient) -> int:
             meaning = sympy.exp(self._field.expression(base))
             index = self._new("exp", meaning, (base,), PLUS)
-            self._declare_size(index, self._tower.sign(base).value)
+            if sign := self._tower.sign(base).value:  # it lies above or below 1
+                excess = self._tower.add(f"excess over 1 of x{index}", constant=False, sign=1)
+                self._tower.signs.declare_form(index, self._tower.gens[excess] + 1, below_one=sign < 0)
             return index
 
         index, multiple = self._multiple("exp", argument, make)
@@ -138,12 +140,6 @@ class Transcendental:
             else:
                 rest[monomial] = coefficient
         return t.polynomial(t.context.from_dict(rest)), factor
-
-    def _declare_size(self, index: int, sign: int) -> None:
-        """An exponential of known sign of the argument lies above or below 1."""
-        if sign:
-            excess = self._tower.add(f"excess over 1 of x{index}", constant=False, sign=1)
-            self._tower.signs.declare_form(index, self._tower.gens[excess] + 1, below_one=sign < 0)
 
     def _multiple(self, kind: str, argument: Quotient, make: Callable[[Quotient], int]) -> tuple[int, int]:
         """(generator, n): the argument is n times the generator's base.

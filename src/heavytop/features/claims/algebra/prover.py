@@ -461,7 +461,10 @@ class Prover:
         """(whether the residual is proven to be 0, the conditions under which that proves the statement)."""
         proven, divisors = self._identity(statement)
         sample = self._sample(statement)
-        return proven, (*self._conditions_of(statement), *divisors, sample)
+        key = (statement.branch, statement.domain, statement.formulas, id(statement.flow))
+        if key not in self._conditions:
+            self._conditions[key] = tuple(self._conditions_of(statement))
+        return proven, (*self._conditions[key], *divisors, sample)
 
     def _identity(self, statement: Statement) -> tuple[bool, list[Condition]]:
         """By one field, or for ``all`` by one for either sign of the variable: together they are dense in it."""
@@ -531,15 +534,9 @@ class Prover:
         except Unprovable:
             return False
 
-    def _conditions_of(self, statement: Statement) -> tuple[Condition, ...]:
-        key = (statement.branch, statement.domain, statement.formulas, id(statement.flow))
-        if key not in self._conditions:
-            self._conditions[key] = tuple(self._make_conditions(statement))
-        return self._conditions[key]
-
-    def _make_conditions(self, statement: Statement) -> list[Condition]:
+    def _conditions_of(self, statement: Statement) -> list[Condition]:
         domain, f = statement.domain, statement.formulas
-        ends = domain.holds_its_end
+        ends = domain.label == "t<=0" and not domain.note  # 0 is an end that belongs to the domain
         everywhere = self._region(statement, domain.sign, strict=bool(domain.sign) and not ends)
         inner = self._region(statement, domain.sign, strict=True) if ends else everywhere
         if everywhere is None or inner is None:
@@ -558,7 +555,12 @@ class Prover:
                 needed[need] = _AT_THE_END
             elif not how and continuous and inner.is_removable(need):
                 needed[need] = _REMOVABLE
-        conditions = [_condition(need, how, everywhere) for need, how in needed.items()]
+        conditions = []
+        for need, how in needed.items():
+            missing = "" if how else everywhere.assumption_for(need)
+            unmet = f"{missing} is not assumed" if missing.endswith("!= 0") else "not shown"
+            reason = how or everywhere.fails_everywhere(need) or unmet
+            conditions.append(Condition(need.text, bool(how), reason, missing))
         for text, values, obstacle in ((_CONTINUOUS, f.values, against[0]), (_ATTITUDE, f.attitude, against[1])):
             if values:
                 conditions.append(Condition(text, not obstacle, obstacle or "by the rules of composition"))
@@ -572,15 +574,6 @@ class Prover:
             against = region.leaves(rate)
             reason = against or "its rate is a combination of the conditions"
             yield Condition(f"{text} = 0 is kept by the flow", not against, reason)
-
-
-def _condition(need: Need, how: str, region: Region) -> Condition:
-    """On what the formulas need, discharged in this way; "" where it is not."""
-    if how:
-        return Condition(need.text, True, how)
-    missing = region.assumption_for(need)
-    reason = f"{missing} is not assumed" if missing.endswith("!= 0") else "not shown"
-    return Condition(need.text, False, region.fails_everywhere(need) or reason, missing)
 
 
 def _missed(statement: Statement, setting: Setting) -> str:

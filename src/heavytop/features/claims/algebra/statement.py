@@ -30,11 +30,6 @@ class Domain:
     note: str = ""
     facts: tuple[sympy.Expr, ...] = ()
 
-    @property
-    def holds_its_end(self) -> bool:
-        """Whether 0 is an end that belongs to the domain."""
-        return self.label == "t<=0" and not self.note
-
 
 # the last are beyond a quarter of a period, where another branch of an inverse function shows
 _BEFORE = (Fraction(-1, 2), Fraction(-7, 5), Fraction(-1, 9), Fraction(-17, 3))

@@ -14,7 +14,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import msgspec
 
@@ -103,17 +103,16 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable | ValueC
 
 
 def _value_claim(table: Mapping[str, Any], entry: Entry | None, where: str) -> ValueClaim:
+    def place(match: re.Match[str]) -> str:
+        """``value 3: `` of ``value[2].``: the numbers of a file are counted from 1."""
+        return f"value {int(match[1]) + 1}" + (": " if match[2] else "")
+
     try:
         with prefixed(where):
             return ValueClaim(msgspec.convert(table, ValueFile), entry)
     except (msgspec.ValidationError, RecursionError) as error:
-        cause = re.sub(r"\bvalue\[(\d+)\](\.)?", _place, invalid(error, ValueFile))
+        cause = re.sub(r"\bvalue\[(\d+)\](\.)?", place, invalid(error, ValueFile))
         raise InputError(f"{where}: {cause}.", f"Numbers are text, as they are printed. {_REMEDY}") from None
-
-
-def _place(match: re.Match[str]) -> str:
-    """``value 3: `` of ``value[2].``: the numbers of a file are counted from 1."""
-    return f"value {int(match[1]) + 1}" + (": " if match[2] else "")
 
 
 PAPER = ("ershkov-general", "ershkov-partial")
@@ -265,11 +264,7 @@ def audited(entry: Entry, system: str = "") -> tuple[Judged, Audit | None]:
         raise
     except HeavyTopError as error:
         return Judged("undecided", perf_counter() - began, error.cause), None
-    return Judged(_verdict(audit), perf_counter() - began), audit
-
-
-def _verdict(audit: Audit) -> Verdict:
-    return "holds" if audit.verdict == "holds" else "refuted" if audit.verdict == "refuted" else "undecided"
+    return Judged(cast(Verdict, audit.verdict), perf_counter() - began), audit
 
 
 @cache

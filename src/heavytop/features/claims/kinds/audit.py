@@ -110,14 +110,18 @@ class AuditKind(Kind):
         """Whether the claims are motions of the heavy top, and how many of each system's equations are proven; how many
         claims of the library hold, and whether that is what is expected.
         """
-        paper, entries = _parted(rows)
+        entries = [row for row in rows if EXPECTED.text in row.metrics]  # of the library
+        paper = [row for row in rows if EXPECTED.text not in row.metrics]
         if any(row.system == HEAVY_TOP.name for row in paper):
             yield _of_paper(paper)
         elif entries:
-            yield _of_verdicts(entries)
+            values = {row.metrics[EXPECTED.text].value for row in entries}
+            word = "failed" if "0" in values else "undecided" if UNRESOLVED in values else ""
+            yield Headline(_of_library(entries), Word(word) if word else None)
         if entries:
             yield Note(_of_library(entries), shown=In.SHORT | In.FULL | In.PAGE if paper else In.SHORT)
-            yield Table("Library of claims", _COLUMNS, [_entry(row) for row in _worst_first(entries)], shown=In.PAGE)
+            worst_first = sorted(entries, key=lambda row: ("refuted", "undecided", "holds").index(_verdict(row)[0]))
+            yield Table("Library of claims", _COLUMNS, [*map(_entry, worst_first)], shown=In.PAGE)
         if paper:
             lines = [line for claim in sorted({row.case for row in paper}) for line in _equations(claim, paper)]
             yield Card("Equation by equation (heavytop audit)", lines, shown=In.FULL | In.PAGE)
@@ -141,11 +145,6 @@ def _of_paper(rows: Sequence[Row]) -> Headline:
 
 
 _EVERYWHERE = In.SHORT | In.FULL | In.PAGE
-
-
-def _worst_first(rows: Sequence[Row]) -> list[Row]:
-    """Refuted claims before undecided ones, and these before what holds."""
-    return sorted(rows, key=lambda row: ("refuted", "undecided", "holds").index(_verdict(row)[0]))
 
 
 def _entry(row: Row) -> list[Cell]:
@@ -200,12 +199,6 @@ def _of_entry(task: Task) -> Row:
     return exact_row(task, f"claimed: {entry.source.text}", against, by_name(metrics))
 
 
-def _parted(rows: Sequence[Row]) -> tuple[list[Row], list[Row]]:
-    """Rows of the paper and of the library."""
-    of_library = [row for row in rows if EXPECTED.text in row.metrics]
-    return [row for row in rows if EXPECTED.text not in row.metrics], of_library
-
-
 def _of_library(rows: Sequence[Row]) -> str:
     """How many claims hold and are refuted, and those whose verdict is not the expected one."""
     verdicts = [_verdict(row)[0] for row in rows]
@@ -217,17 +210,8 @@ def _of_library(rows: Sequence[Row]) -> str:
     return f"Library of {plural(len(rows), 'claim')}: {', '.join(counted)}; {expected}."
 
 
-def _of_verdicts(rows: Sequence[Row]) -> Headline:
-    wrong = any(row.metrics[EXPECTED.text].value == "0" for row in rows)
-    undecided = any(row.metrics[EXPECTED.text].value == UNRESOLVED for row in rows)
-    word = Word("failed") if wrong else Word("undecided") if undecided else None
-    return Headline(_of_library(rows), word)
-
-
 def _value(holds: bool | None) -> Metric:
-    return (
-        Metric(UNRESOLVED, None, "value") if holds is None else Metric(str(int(holds)), 0.0 if holds else None, "value")
-    )
+    return Metric(UNRESOLVED if holds is None else str(int(holds)), 0.0 if holds else None, "value")
 
 
 def _equations_of(row: Row) -> list[Metric]:

@@ -284,7 +284,7 @@ class ClaimModel(Kind):
             yield _headline(parted)
         forward = [row for row in parted if row.key.direction != "backward"]
         yield from _parting_times(forward)
-        times = [time for time in _SHOWN if any(_at(row, "omega", time) for row in rows)]
+        times = [time for time in _SHOWN if any(exact(time) in _values(row, "omega") for row in rows)]
         heads = (*(f"ΔΩ at |t|={t}" for t in times), *(f"Δγ at |t|={t}" for t in times[:2]))
         yield Cells(
             "Claim compared with the true motion: (4.2)-(4.6) as a motion of the heavy top, from its own data at t = 0",
@@ -333,7 +333,8 @@ def _parting_times(rows: Sequence[Row]) -> Iterator[Cells]:
 
 
 def _cells(row: Row, times: Sequence[str]) -> list[Cell]:
-    omega, gamma = ([short(_at(row, part, t) or "-") for t in times] for part in ("omega", "gamma"))
+    parts = (_values(row, part) for part in ("omega", "gamma"))
+    omega, gamma = ([short(values.get(exact(t)) or "-") for t in times] for values in parts)
     return [row.key.subject.branch, *omega, *gamma[:2], Value(row.metrics.get(PARTS.text))]
 
 
@@ -366,13 +367,10 @@ def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[errors_o
     return delone, proven.against
 
 
-def _values(row: Row, component: str) -> dict[str, str]:
+def _values(row: Row, component: str) -> dict[Fraction, str]:
+    """The errors of a component, by |t|."""
     series = row.series.get(Quantity(MODEL_ERROR, component).text)
-    return dict(zip(series.times, series.values, strict=False)) if series else {}
-
-
-def _at(row: Row, component: str, time: str) -> str | None:
-    return {abs(exact(t)): value for t, value in _values(row, component).items()}.get(exact(time))
+    return {abs(exact(t)): value for t, value in zip(series.times, series.values, strict=False)} if series else {}
 
 
 def _card(row: Row, others: Iterable[Row]) -> Card:
@@ -392,7 +390,8 @@ def _card(row: Row, others: Iterable[Row]) -> Card:
         when = f"not up to |t| = {horizon}" if at == "never" else f"from |t| = {at}"
         lines.append(Note(f"On the {clip(other.key.subject.branch, 20)} branch: {when}."))
     omega, gamma = (_values(row, component) for component in ("omega", "gamma"))
-    cells = [(t, short(omega[t]), short(gamma.get(t, "missing"))) for t in _SHOWN if t in omega]
+    shown = {t: exact(t) for t in _SHOWN if exact(t) in omega}
+    cells = [(t, short(omega[time]), short(gamma.get(time, "missing"))) for t, time in shown.items()]
     title = f"{clip(row.key.case)}, {clip(row.key.subject.branch, 20)} branch: wrong from"
     table = Cells("Error of Ω (1/time unit) and of γ (|γ| = 1)", ("|t|", "|ΔΩ|", "|Δγ|"), cells)
     return Card(title, lines, table, f"True motion: {row.reference.brief}")
