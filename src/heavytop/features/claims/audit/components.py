@@ -9,7 +9,7 @@ quadrature t = ∫ du/√f(u) and the rates of angles are statements on the stat
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 
@@ -25,6 +25,7 @@ from heavytop.features.claims.algebra.structure import at_values, rate_along, ra
 from heavytop.features.claims.audit.context import (
     DOMAINS,
     STATE,
+    ClaimFile,
     ComponentTable,
     IntegralTable,
     needs_of,
@@ -53,12 +54,8 @@ def _rate_of_angle(name: str, omega: tuple[sympy.Expr, ...]) -> tuple[sympy.Expr
     return omega[0] * _GAMMA[1] - omega[1] * _GAMMA[0], sympy.sqrt(_ACROSS)
 
 
-@dataclass(frozen=True)
 class UserComponent(UserIntegral):
     """A component claimed in a file: its statements on the state are those of relations, the values of the start."""
-
-    quantity: Formula = field(init=False)
-    start: tuple[Formula, ...] = field(init=False)
 
     @property
     def variables(self) -> tuple[sympy.Symbol, ...]:
@@ -79,19 +76,17 @@ class UserComponent(UserIntegral):
     def _table(self) -> IntegralTable:
         return IntegralTable("0", self._component.where)
 
-    def __post_init__(self) -> None:
-        UserIntegral.__post_init__(self)
-        names, table, start = self.context.names, self._component, self.content.start
-        quantity = parse(table.quantity, names, "component.quantity")
-        self._check(table, quantity)
-        begin: tuple[Formula, ...] = ()
+    def __init__(self, content: ClaimFile) -> None:
+        super().__init__(content)
+        names, table, start = self.context.names, self._component, content.start
+        self.quantity = parse(table.quantity, names, "component.quantity")
+        self._check(table, self.quantity)
+        self.start: tuple[Formula, ...] = ()
         if start is not None and start.omega is not None and start.gamma is not None:
-            begin = (*three(start.omega, names, "start.omega"), *three(start.gamma, names, "start.gamma"))
+            self.start = (*three(start.omega, names, "start.omega"), *three(start.gamma, names, "start.gamma"))
         elif start is not None or table.value is not None:
             raise InputError("[start] needs omega and gamma.", "Give the state at t = 0, in the parameters.")
-        object.__setattr__(self, "quantity", quantity)
-        object.__setattr__(self, "start", begin)
-        object.__setattr__(self, "where", (*self.where, *self._levels()))
+        self.where = (*self.where, *self._levels())
 
     def _check(self, table: ComponentTable, quantity: Formula) -> None:
         if not quantity.expression.free_symbols & frozenset(STATE):

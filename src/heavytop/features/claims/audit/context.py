@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import combinations, pairwise
 from typing import Annotated, Self
@@ -496,30 +496,18 @@ def of_file(asked: System | None, written: str | None, usual: System) -> System:
 _NO_FORMULAS = ("name", "kind", "stable", "system", "source", "domain", "assume", "parameters", "definitions", "entry")
 
 
-@dataclass(frozen=True)
 class FileClaim:
-    """A claim of a file."""
+    """A claim of a file: its kind is motion, component, integral, relation or stability."""
 
-    content: ClaimFile
-    context: Context = field(init=False)
+    def __init__(self, content: ClaimFile) -> None:
+        self.content = content
+        self.context = parse_context(content, self.variables)
+        self.name, self.source, self.kind, self.entry = content.name, content.source, content.kind, content.entry
 
     @property
     def variables(self) -> tuple[sympy.Symbol, ...]:
         """Symbols that its formulas may hold beside its parameters."""
         return ()
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "context", parse_context(self.content, self.variables))
-
-    @property
-    def name(self) -> str:
-        """As the file has it."""
-        return self.content.name
-
-    @property
-    def source(self) -> str:
-        """As the file has it."""
-        return self.content.source
 
     @property
     def unassumed(self) -> list[str]:
@@ -540,16 +528,6 @@ class FileClaim:
     def assuming(self, bound: str) -> Self:
         """The claim with one assumption more; raises InputError where a sample breaks it."""
         return type(self)(structs.replace(self.content, assume=[*self.content.assume, bound]))
-
-    @property
-    def entry(self) -> Entry | None:
-        """The entry of the library that the file is."""
-        return self.content.entry
-
-    @property
-    def kind(self) -> str:
-        """motion, component, integral or relation."""
-        return self.content.kind
 
     def about(self, asked: System | None) -> System:
         """The system asked for, else the file's, else `heavy_gyrostat` where it gives k, else `heavy_top`.

@@ -8,7 +8,7 @@ over the whole domain; what refutes is the opposite, proven at a sample.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from functools import partial
 from typing import Any
@@ -21,6 +21,7 @@ from heavytop.features.claims.algebra.prover import Condition
 from heavytop.features.claims.algebra.ring import where_provable
 from heavytop.features.claims.algebra.statement import ALL, TIME, Statement
 from heavytop.features.claims.algebra.structure import rationals
+from heavytop.features.claims.audit.context import ClaimFile
 from heavytop.features.claims.audit.judge import StatementVerdict, verdict_of
 from heavytop.features.claims.audit.user_claims import UserMotion
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
@@ -32,13 +33,12 @@ _CRITERIA = {
 }
 
 
-@dataclass(frozen=True)
 class UserStability(UserMotion):
     """A steady motion claimed in a file to be stable or unstable."""
 
-    def __post_init__(self) -> None:
-        UserMotion.__post_init__(self)
-        table, content = self.content.motion, self.content
+    def __init__(self, content: ClaimFile) -> None:
+        super().__init__(content)
+        table = content.motion
         assert table is not None
         moves = TIME in sympy.Tuple(*self.motion.state).free_symbols
         if moves or table.omega is None or table.gamma is None or self.motion.attitude:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import islice
@@ -63,25 +63,20 @@ def _expressions(formulas: tuple[Formula, Formula, Formula]) -> Triple:
     return formulas[0].expression, formulas[1].expression, formulas[2].expression
 
 
-@dataclass(frozen=True)
 class UserMotion(FileClaim):
     """A motion claimed in a file."""
 
-    motion: ClaimedMotion = field(init=False)
-    clock: Clock = field(init=False)
+    def __init__(self, content: ClaimFile) -> None:
+        super().__init__(content)
+        assert content.motion is not None
+        self.clock = _with_times(read_clock(content, self.context), content)
+        self.context = _with_constant_rotor(self.context, self.clock)
+        self.motion = _read_motion(content.motion, self.context, self.clock)
 
     @property
     def variables(self) -> tuple[sympy.Symbol, ...]:
         """t, or the variable of the quadrature."""
         return (variable_of(self.content),)
-
-    def __post_init__(self) -> None:
-        FileClaim.__post_init__(self)
-        assert self.content.motion is not None
-        object.__setattr__(self, "clock", _with_times(read_clock(self.content, self.context), self.content))
-        object.__setattr__(self, "context", _with_constant_rotor(self.context, self.clock))
-        motion = _read_motion(self.content.motion, self.context, self.clock)
-        object.__setattr__(self, "motion", motion)
 
     @property
     def setting(self) -> Setting:
@@ -325,26 +320,21 @@ _BITS = 192
 OFF_SPHERE = sum(x**2 for x in STATE[3:]) - 1
 
 
-@dataclass(frozen=True)
 class UserIntegral(FileClaim):
     """A first integral or an invariant relation claimed in a file."""
 
-    value: Formula = field(init=False)
-    where: tuple[Formula, ...] = field(init=False)
+    def __init__(self, content: ClaimFile) -> None:
+        super().__init__(content)
+        table, names = self._table, self.context.names
+        self.value = parse(table.value, names, "integral.value")
+        self.where = tuple(parse(text, names, "integral.where") for text in table.where)
+        _check_states(table)
+        self.context = self._with_constant_rotor()
 
     @property
     def variables(self) -> tuple[sympy.Symbol, ...]:
         """Ω and γ."""
         return tuple(STATE)
-
-    def __post_init__(self) -> None:
-        FileClaim.__post_init__(self)
-        table = self._table
-        object.__setattr__(self, "value", parse(table.value, self.context.names, "integral.value"))
-        where = tuple(parse(text, self.context.names, "integral.where") for text in table.where)
-        object.__setattr__(self, "where", where)
-        _check_states(table)
-        object.__setattr__(self, "context", self._with_constant_rotor())
 
     def _with_constant_rotor(self) -> Context:
         """The context; raises InputError unless the rotor is constant along the motion of the gyrostat."""

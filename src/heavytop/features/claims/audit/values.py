@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -226,19 +226,15 @@ def judge_figure(figure: Figure, known: Fraction | arb) -> Judgement:
     return Judgement(holds, least, holds is not None and least == most, middle, wide, (low, high))
 
 
-@dataclass(frozen=True)
 class ValueClaim:
     """Published numbers of one motion."""
 
-    content: ValueFile
-    entry: Entry | None = None
-    kind: str = "value"
-    figures: tuple[Figure, ...] = field(init=False)
-    motion: tuple[HeavyTop | Body, State] = field(init=False)
+    kind = "value"
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "figures", tuple(_figures(self.content.value)))
-        object.__setattr__(self, "motion", _read_motion(self.content))
+    def __init__(self, content: ValueFile, entry: Entry | None = None) -> None:
+        self.content, self.entry = content, entry
+        self.figures = tuple(_figures(content.value))
+        self.motion = _read_motion(content)
 
     def about(self, asked: System | None) -> System:
         """The system asked for, else the file's, else `heavy_gyrostat` where there is a rotor, else `heavy_top`.
