@@ -140,16 +140,13 @@ class DriftKind(Kind):
 def _row(task: Task, run: Trajectory, scorer: Scorer) -> Row:
     noise, alone = task.options.noise, task.options.attitude and run.problem.xi is None
     left_out = ({} if noise else {NOISE: NOT_MEASURED}) | (NOT_CARRIED if alone else {})
-    metrics = _banded(task, run, scorer) if noise else scorer.metrics()
+    metrics = scorer.metrics()
+    if noise:
+        plain = Problem.of(task.given.top, task.given.start, DOUBLE, task.given.system)
+        metrics = Reruns(plain, task.integrator, task.seed).drift_bands(run, task.times, metrics, scorer.truth)
     marked = replace(run, flags=run.flags | left_out)
     row = computed_row(task, marked, metrics, scorer.series(time_text), scorer.against)
     return with_explanation(row, task, run, scorer)
-
-
-def _banded(task: Task, run: Trajectory, scorer: Scorer) -> dict[str, Metric]:
-    assert task.case is not None
-    plain = Problem.of(task.case.top, task.given.start, DOUBLE, task.given.system)
-    return Reruns(plain, task.integrator, task.seed).drift_bands(run, task.times, scorer.metrics(), scorer.truth)
 
 
 def _require_same_samples(scorer: Scorer, times: Sequence[Fraction], samples: int) -> None:

@@ -96,7 +96,9 @@ class Ratio:
 
     def __mul__(self, other: Any) -> Ratio:
         o = Ratio.of(other)
-        _require_degree(self, o)
+        pairs = (self.numerator, o.numerator), (self.denominator, o.denominator)
+        if (degree := max(a.total_degree() + b.total_degree() for a, b in pairs)) > _HIGHEST:
+            raise InputError(f"The function has degree {degree}.", f"Up to degree {_HIGHEST} is taken.")
         return Ratio(self.numerator * o.numerator, self.denominator * o.denominator)
 
     def __truediv__(self, other: Any) -> Ratio:
@@ -154,15 +156,6 @@ class Ratio:
             return self
         common = self.numerator.gcd(self.denominator)
         return Ratio(self.numerator / common, self.denominator / common)
-
-
-def _require_degree(a: Ratio, b: Ratio) -> None:
-    degree = max(
-        a.numerator.total_degree() + b.numerator.total_degree(),
-        a.denominator.total_degree() + b.denominator.total_degree(),
-    )
-    if degree > _HIGHEST:
-        raise InputError(f"The function has degree {degree}.", f"Up to degree {_HIGHEST} is taken.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -456,12 +449,6 @@ class Events(Tabular):
         }
 
     def _table(self) -> TitledTable:
-        digits = min(_SHOWN, self.problem.precision.digits)
-
-        def line(index: int) -> list[str]:
-            numbers = [decimal_text(exact(v), digits) for v in (self.times[index], *self.states[index])]
-            return [numbers[0], _arrow(self.directions[index]), *numbers[1:]]
-
         title = (
             f"{_counted(self)} {self.function} in {self.problem.precision.name} by {self.integrator}, "
             f"t = 0 to {decimal_text(self.until, 6)}"
@@ -469,7 +456,7 @@ class Events(Tabular):
         notes = [_EXPLAINED[self.guarantee], *filter(None, [self.discontinuity_text()])]
         if self.outcome is not Outcome.SUCCESS:
             notes.append(f"{self.outcome.message}; looked up to t = {decimal_text(self.time_reached, 6)} only")
-        return TitledTable(title, ("t", "sign", *NAMES), LazyLines(len(self), line), notes)
+        return _listed(self, title, self.problem.precision.digits, exact, notes)
 
 
 class ReferenceEvents(Tabular, msgspec.Struct, frozen=True):
@@ -517,16 +504,10 @@ class ReferenceEvents(Tabular, msgspec.Struct, frozen=True):
         return numpy.array([[rounded_up(ball.radius) for ball in state] for state in self.states]).reshape(-1, 6)
 
     def _table(self) -> TitledTable:
-        digits = min(_SHOWN, self.digits)
-
-        def line(index: int) -> list[str]:
-            numbers = [decimal_text(exact(b.value), digits) for b in (self.times[index], *self.states[index])]
-            return [numbers[0], _arrow(self.directions[index]), *numbers[1:]]
-
         worst = max((Fraction(ball.radius) for ball in self.times), default=Fraction(0))
         title = f"{_counted(self)} {self.function}, known to {self.digits} digits, t = 0 to {self.until[:_SHOWN]}"
         notes = [_EXPLAINED[PROVEN], f"largest radius of a time {radius_text(worst)}; {self.method}"]
-        return TitledTable(title, ("t", "sign", *NAMES), LazyLines(len(self), line), notes)
+        return _listed(self, title, self.digits, lambda ball: exact(ball.value), notes)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -572,8 +553,17 @@ _EXPLAINED = {
 }
 
 
-def _arrow(direction: Any) -> str:
-    return "rises" if direction > 0 else "falls"
+def _listed(
+    events: Events | ReferenceEvents, title: str, digits: int, number: Callable[[Any], Fraction], notes: list[str]
+) -> TitledTable:
+    """A line for each event: its time, whether the function rises, and the state."""
+
+    def line(index: int) -> list[str]:
+        exactly = map(number, (events.times[index], *events.states[index]))
+        time, *state = (decimal_text(value, min(_SHOWN, digits)) for value in exactly)
+        return [time, "rises" if events.directions[index] > 0 else "falls", *state]
+
+    return TitledTable(title, ("t", "sign", *NAMES), LazyLines(len(events), line), notes)
 
 
 def arrays(times: Sequence[Any], states: Sequence[Any], directions: Sequence[int]) -> tuple[Array, Array, Array]:

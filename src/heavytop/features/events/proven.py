@@ -39,6 +39,7 @@ from heavytop.features.events.functions import (
     terms_of,
 )
 from heavytop.precision import decimal_text
+from heavytop.top.attitude import rotated
 
 _GUARD_BITS = 24
 _ATTEMPTS = 3
@@ -431,11 +432,6 @@ def _hull(pieces: Sequence[_Piece], choose: Callable[[_Piece], Any], low: Fracti
     return hull
 
 
-def _rotated(axes: Any, vector: Sequence[arb]) -> list[arb]:
-    """A vector in the axes given."""
-    return [sum((ball(a) * x for a, x in zip(row, vector, strict=True)), arb(0)) for row in axes]
-
-
 @whole_evaluation
 def _refined(
     pieces: Sequence[_Piece],
@@ -460,7 +456,8 @@ def _refined(
         time = (ball(middle) + arb(0, ball(half).upper())) * unit
         state = [_hull(pieces, lambda piece, i=index: piece.components[i], low, high) for index in range(6)]  # type: ignore[misc]
         if axes is not None:
-            state = [*_rotated(axes, state[:3]), *_rotated(axes, state[3:])]
+            turn = [[ball(entry) for entry in row] for row in axes]
+            state = [*rotated(turn, state[:3]), *rotated(turn, state[3:])]
         below = _sign(_hull(pieces, lambda piece: piece.below, low, high))
     allowed = Fraction(1, 2 * 10**digits)
     if any(radius(v) > allowed * max(Fraction(1), abs(midpoint(v))) for v in (time, *state)):

@@ -52,22 +52,28 @@ def sign_changes(polynomial: fmpz_poly, end: fmpq, resolution: int) -> Iterator[
 
     resolution: intervals of length 2^-resolution ``end`` are not divided any more.
     """
-    if end > 0 and not _bounded_away(polynomial):
+    sizes = [abs(int(c)) for c in polynomial.coeffs()]
+    # unless the constant coefficient alone keeps the polynomial from 0 on 0 ≤ x ≤ 1
+    if end > 0 and (not sizes or sizes[0] <= sum(sizes[1:])):
         yield from _isolated(_scaled(polynomial, end), 0, 0, end, min(resolution, _DEEPEST))
 
 
 def _isolated(part: fmpz_poly, position: int, depth: int, span: fmpq, resolution: int) -> Iterator[SignChange]:
     """The changes in part ``position`` of 2^``depth`` of (0, span); ``part`` is the polynomial there on (0, 1)."""
-    part = _without_root_at_zero(part)
-    variations = _variations(part)
-    if variations == 0:
+    at_zero = next((n for n, c in enumerate(part.coeffs()) if c), 0)
+    coefficients = part.coeffs()[at_zero:]  # without a root at 0
+    part = fmpz_poly(coefficients)
+    # Descartes' bound of the number of roots in (0, 1)
+    if not _alternates(coefficients) or not (
+        variations := _alternates(fmpz_poly(coefficients[::-1])(_ONE_MORE).coeffs())
+    ):
         return
     if variations == 1 or depth >= resolution:
         before, after = sign_after(part), sign_before(part)
         if before != after:
             yield SignChange(span * fmpq(position, 1 << depth), span * fmpq(position + 1, 1 << depth), after > 0)
         return
-    left = _halved(part)
+    left = fmpz_poly([c << (len(coefficients) - 1 - n) for n, c in enumerate(coefficients)])  # 2^n g(x/2)
     right = left(_ONE_MORE)
     yield from _isolated(left, 2 * position, depth + 1, span, resolution)
     if right[0] == 0 and sign_before(left) != (after := sign_after(right)):
@@ -76,34 +82,9 @@ def _isolated(part: fmpz_poly, position: int, depth: int, span: fmpq, resolution
     yield from _isolated(right, 2 * position + 1, depth + 1, span, resolution)
 
 
-def _bounded_away(polynomial: fmpz_poly) -> bool:
-    """Whether the constant coefficient alone keeps the polynomial from 0 on 0 ≤ x ≤ 1."""
-    sizes = [abs(int(c)) for c in polynomial.coeffs()]
-    return bool(sizes) and sizes[0] > sum(sizes[1:])
-
-
 def _scaled(polynomial: fmpz_poly, end: fmpq) -> fmpz_poly:
     """A positive multiple of g(end x): that on (0, 1) is g on (0, end)."""
     return polynomial if end == 1 else fmpq_poly(polynomial)(fmpq_poly([0, end])).numer()
-
-
-def _without_root_at_zero(polynomial: fmpz_poly) -> fmpz_poly:
-    count = next((n for n, c in enumerate(polynomial.coeffs()) if c), 0)
-    return fmpz_poly(polynomial.coeffs()[count:]) if count else polynomial
-
-
-def _halved(polynomial: fmpz_poly) -> fmpz_poly:
-    """2^n g(x/2)."""
-    coefficients = polynomial.coeffs()
-    last = len(coefficients) - 1
-    return fmpz_poly([c << (last - n) for n, c in enumerate(coefficients)])
-
-
-def _variations(polynomial: fmpz_poly) -> int:
-    """Descartes' bound of the number of roots in (0, 1)."""
-    if not _alternates(polynomial.coeffs()):
-        return 0
-    return _alternates(fmpz_poly(polynomial.coeffs()[::-1])(_ONE_MORE).coeffs())
 
 
 def _alternates(coefficients: Sequence[fmpz]) -> int:

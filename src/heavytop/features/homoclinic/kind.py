@@ -118,9 +118,10 @@ class Homoclinic(Kind):
         truth = known.truth.remembered()
         scorer = _scorer(case, problem, truth, task.keep)
         run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer)
-        metrics = _with_bands(task, run, _metrics(scorer))
         error = scorer.error
         assert error is not None
+        own = by_name({ESCAPE: time_metric(error.escape, "duration")}) | error.metrics() | scorer.drift.metrics()
+        metrics = _with_bands(task, run, own)
         series = error.series(time_text) | scorer.drift.series(time_text)
         return computed_row(task, run, metrics, series, known.against)
 
@@ -237,12 +238,6 @@ def _scorer(case: Case, problem: Problem, truth: Truth, keep: Sequence[Fraction]
     name = INTEGRATION_ERROR if isinstance(case.homoclinic, ErshkovPartial) else SOLUTION_ERROR
     until = WINDOW / case.rate
     return Scorer(problem, truth, keep, threshold=ESCAPED * case.alpha, until=until, name=name)
-
-
-def _metrics(scorer: Scorer) -> dict[str, Metric]:
-    assert scorer.error is not None
-    escape = time_metric(scorer.error.escape, "duration")
-    return by_name({ESCAPE: escape}) | scorer.error.metrics() | scorer.drift.metrics()
 
 
 def _with_bands(task: Task, run: Trajectory, metrics: dict[str, Metric]) -> dict[str, Metric]:

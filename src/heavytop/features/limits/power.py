@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 import numpy
@@ -201,33 +202,18 @@ def _torque_alone(p: Parameters, y: Sequence[Scalar]) -> tuple[Scalar, ...]:
 _NO_GYROSCOPIC_TERM = System("no_gyroscopic_term", _torque_alone, lambda _, y: tuple(y[:3]))
 
 
-def _no_gyroscopic_term(motion: Motion, times: Sequence[Fraction]) -> Array:
-    return _rows(motion, times, field=_NO_GYROSCOPIC_TERM)
-
-
 def _transposed(motion: Motion, times: Sequence[Fraction]) -> Array:
     rows = _rows(motion, times)
     matrices = rows[:, 3:].reshape(-1, 3, 3).transpose(0, 2, 1).reshape(-1, 9)
     return numpy.hstack([rows[:, :3], matrices])
 
 
-def _late(motion: Motion, times: Sequence[Fraction]) -> Array:
-    return _rows(motion, [time - times[0] / 2 for time in times])
-
-
-def _single(motion: Motion, times: Sequence[Fraction]) -> Array:
-    return _rows(motion, times, real(24))
-
-
-def _steiner(twice: bool) -> Callable[[Motion, Sequence[Fraction]], Array | str]:
-    def fault(motion: Motion, times: Sequence[Fraction]) -> Array | str:
-        body = motion[0]
-        if not isinstance(body, Body) or not any(body.centre):
-            return "no mass off the pivot is given"
-        change = steiner(body.mass, body.centre)
-        return _of_tensor(motion, times, (plus if twice else minus)(body.tensor, change))
-
-    return fault
+def _steiner(motion: Motion, times: Sequence[Fraction], changed: Any) -> Array | str:
+    """The Steiner term forgotten, or added twice."""
+    body = motion[0]
+    if not isinstance(body, Body) or not any(body.centre):
+        return "no mass off the pivot is given"
+    return _of_tensor(motion, times, changed(body.tensor, steiner(body.mass, body.centre)))
 
 
 def _of_tensor(motion: Motion, times: Sequence[Fraction], tensor: Any) -> Array | str:
@@ -264,12 +250,12 @@ def _gravity(motion: Motion, times: Sequence[Fraction]) -> Array | str:
 
 
 FAULTS: dict[str, Callable[[Motion, Sequence[Fraction]], Array | str]] = {
-    "no_gyroscopic_term": _no_gyroscopic_term,
+    "no_gyroscopic_term": lambda motion, times: _rows(motion, times, field=_NO_GYROSCOPIC_TERM),
     "transposed": _transposed,
-    "steiner_forgotten": _steiner(False),
-    "steiner_twice": _steiner(True),
-    "late": _late,
-    "float32": _single,
+    "steiner_forgotten": partial(_steiner, changed=minus),
+    "steiner_twice": partial(_steiner, changed=plus),
+    "late": lambda motion, times: _rows(motion, [time - times[0] / 2 for time in times]),
+    "float32": lambda motion, times: _rows(motion, times, real(24)),
     "tensor_order": _order,
     "gravity_9.8": _gravity,
 }

@@ -18,6 +18,7 @@ from heavytop.features.survey.measured import Chunk
 from heavytop.files import atomic_write
 from heavytop.harness.case_text import forms
 from heavytop.harness.rows import Task, data_of
+from heavytop.harness.sweeps import Sweep
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import parse, time_text
@@ -209,10 +210,8 @@ class Gathered:
 
     def row(self) -> Row:
         """The row of the report."""
-        chunk = self._task.case
-        assert isinstance(chunk, Chunk)
-        assert chunk.sweep is not None
-        name, cases = chunk.sweep.name, chunk.sweep.cases()
+        sweep = sweep_of(self._task)
+        name, cases = sweep.name, sweep.cases()
         motions = sum(self._outcomes.values())
         failed = motions - self._outcomes.get(Outcome.SUCCESS.value, 0)
         counts = {Quantity(COUNT, outcome): n for outcome, n in sorted(self._outcomes.items())}
@@ -290,9 +289,7 @@ def gathered(rows: Iterator[tuple[Task, Row]]) -> list[Row]:
     sums: dict[Any, Gathered | None] = {}
     lost: dict[Any, Row] = {}
     for task, row in rows:
-        assert isinstance(task.case, Chunk)
-        assert task.case.sweep is not None
-        key = msgspec.structs.replace(row.key, case=task.case.sweep.name)
+        key = msgspec.structs.replace(row.key, case=sweep_of(task).name)
         entry = sums.setdefault(key, None)
         if not isinstance(row.chunk, bytes):
             lost.setdefault(key, msgspec.structs.replace(row, case=key.case, key=key, request=_request(task)))
@@ -305,9 +302,13 @@ def gathered(rows: Iterator[tuple[Task, Row]]) -> list[Row]:
 
 def _request(task: Task) -> dict[str, str]:
     """The request of a survey: which tops, and what its table says."""
+    return {"tops": sweep_of(task).exact_data, **(task.request or {})}
+
+
+def sweep_of(task: Task) -> Sweep:
+    """The sweep that the motions of a task are of."""
     assert isinstance(task.case, Chunk)
-    assert task.case.sweep is not None
-    return {"tops": task.case.sweep.exact_data, **(task.request or {})}
+    return task.case.sweep
 
 
 def _survey(measured: Gathered | None, lost: Row | None) -> Row:
@@ -320,11 +321,6 @@ def _survey(measured: Gathered | None, lost: Row | None) -> Row:
         return row
     ended = {name: getattr(lost, name) for name in ("outcome", "time_reached", "finite", "reference", "against")}
     return msgspec.structs.replace(row, **ended)
-
-
-def contents(rows: Iterator[Row]) -> Iterator[bytes]:
-    """The Parquet bytes of the chunks, in the order of the plan."""
-    return (row.chunk for row in rows if isinstance(row.chunk, bytes))
 
 
 def of_motions(row: Row) -> Sequence[tuple[str, str]]:

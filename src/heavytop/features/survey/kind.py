@@ -13,7 +13,7 @@ import numpy
 from heavytop.cases import Case
 from heavytop.errors import InputError, quoted
 from heavytop.features.survey.charts import survey_charts
-from heavytop.features.survey.gathered import DATA, FILE, chunk_bytes, contents, gathered, of_motions, write
+from heavytop.features.survey.gathered import DATA, FILE, chunk_bytes, gathered, of_motions, write
 from heavytop.features.survey.joined import METRIC, worse_motions
 from heavytop.features.survey.measured import Chunk, Drawn, chunks, drawn, measured, number_of
 from heavytop.harness.checkpoint import Saved
@@ -113,7 +113,7 @@ class Survey(Kind):
 
     def gather(self, rows: Callable[[], Iterator[tuple[Task, Row]]], folder: Path) -> list[Row]:
         """A row for each sweep and integrator; the records of all motions go into survey.parquet."""
-        write(folder / FILE, contents(row for _, row in rows()))
+        write(folder / FILE, (row.chunk for _, row in rows() if isinstance(row.chunk, bytes)))
         return gathered(rows())
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
@@ -127,7 +127,6 @@ class Survey(Kind):
 def _names(task: Task, motions: Drawn) -> dict[str, object]:
     chunk = task.case
     assert isinstance(chunk, Chunk)
-    assert chunk.sweep is not None
     same = {
         "sweep": chunk.sweep.name,
         "integrator": task.key.subject.name,

@@ -49,15 +49,15 @@ _CLASSES = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Chunk(Case):
     """Motions ``first`` to before ``first + count`` of a sweep, as a case; its own top and start are those of the
     first.
     """
 
-    sweep: Sweep | None = None
-    first: int = 0
-    count: int = 0
+    sweep: Sweep
+    first: int
+    count: int
 
 
 def chunks(sweep: Sweep, cases: Sequence[Case], index: int) -> Chunk:
@@ -107,34 +107,26 @@ class Drawn:
     @property
     def classes(self) -> list[str]:
         """The class of each motion, by the further integrals that it has."""
-        return [_class(integral) for integral in self.integrals]
+        names = [[integral.name.rstrip("123") for integral in integrals] for integrals in self.integrals]
+        return [next((_CLASSES[name] for name in reversed(own) if name in _CLASSES), GENERAL) for own in names]
 
 
 def drawn(chunk: Chunk, precision: Precision, seed: int = 0) -> Drawn:
     """The motions of a chunk, bit for bit those of the sweep's cases; seed: of other roundings."""
-    assert chunk.sweep is not None
     cases = chunk.sweep.cases()
     places = range(chunk.first, chunk.first + chunk.count)
     if isinstance(chunk.sweep, Random) and precision == DOUBLE and not seed:
         numbers = _rounded(numpy.array([chunk.sweep.integers(index) for index in places]))
         further = _may_have_more(numbers)
         integrals = [_integrals(cases[index]) if more else _ALWAYS for index, more in zip(places, further, strict=True)]
-        return Drawn(
-            Lazy(chunk.count, lambda index: _problem(numbers[index])),
-            integrals,
-            Pairs.of(numbers),
-        )
+        return Drawn(Lazy(chunk.count, lambda index: _problem(numbers[index])), integrals, Pairs.of(numbers))
     cases_drawn = [cases[index] for index in places]
     if seed:
         cases_drawn = [replace(case, top=scaled(case.top, factor(seed))) for case in cases_drawn]
     problems = [Problem.of(case.top, case.start, precision, case.system) for case in cases_drawn]
-    return Drawn(problems, [_integrals(case) for case in cases_drawn], _drawn_pairs(problems))
-
-
-def _drawn_pairs(problems: Sequence[Problem]) -> Pairs:
-    """Their numbers, which two doubles hold: of formats of 106 bits at most."""
     rows = [[*problem.system.entering(problem.parameters), *problem.start.flat] for problem in problems]
-    return Pairs.nearest(rows)
+    # two doubles hold the numbers of formats of 106 bits at most
+    return Drawn(problems, [*map(_integrals, cases_drawn)], Pairs.nearest(rows))
 
 
 def _integrals(case: Case) -> tuple[Integral, ...]:
@@ -161,11 +153,6 @@ def _may_have_more(p: Any) -> Any:
     """Where two moments of inertia are equal or a component of the centre is 0: else no further integral is known."""
     equal = (p[:, 0] == p[:, 1]) | (p[:, 1] == p[:, 2]) | (p[:, 0] == p[:, 2])
     return (equal | (p[:, 3:6] == 0).any(axis=1)).tolist()
-
-
-def _class(integrals: Sequence[Integral]) -> str:
-    classes = [kind for integral in integrals for name, kind in _CLASSES.items() if integral.name.rstrip("123") == name]
-    return classes[-1] if classes else GENERAL
 
 
 _ALWAYS = holding(HeavyTop((4, 5, 6), 1, (1, 1, 1)), State((1, 0, 0), (0, 0, 1)))

@@ -279,7 +279,11 @@ def another_start(run: Examined) -> Iterator[Hypothesis]:
         return
     back = run.starting(run.states[0]).supposed([-times[0]])
     truth = run.supposed(times[:1])
-    if back is None or truth is None or not _shows_at_once(run, truth):
+    if back is None or truth is None:
+        return
+    # a motion that magnifies the errors of a method may look like one from another start
+    early, late = run.at(run.rows[:1]).errors(truth), run.errors(run.supposed(times))
+    if early.max() < _AT_ONCE * late.max():
         return
     start = run.in_file(run.start.flat)
     errors = run.starting(back[0]).beside()
@@ -293,23 +297,15 @@ def another_start(run: Examined) -> Iterator[Hypothesis]:
         for name, value, change, size, unit in zip(NAMES, back[0], off, sizes, units, strict=False)
         if change > noise * size
     ]
+
+    def is_round(new: Fraction, near: float) -> bool:
+        """Whether a number is a short decimal, as none is by accident that is known within ``near``."""
+        return new == Fraction(decimal_text(new, SHORT)) and near <= _SPARSE * 10.0**-SHORT * abs(float(new))
+
     # a method of low order carries an error of its first step along as another start
-    if any(large or _is_round(new, near) for _, new, _, large, near in changed):
+    if any(large or is_round(new, near) for _, new, _, large, near in changed):
         numbers = {name: _text(new / unit) for name, new, unit, *_ in changed}
         yield Hypothesis("start", numbers, errors, FITTED_DROP * max(1.0, magnified))
-
-
-def _is_round(new: Fraction, near: float) -> bool:
-    """Whether a number is a short decimal, as none is by accident that is known within ``near``."""
-    return new == Fraction(decimal_text(new, SHORT)) and near <= _SPARSE * 10.0**-SHORT * abs(float(new))
-
-
-def _shows_at_once(run: Examined, first: Array) -> bool:
-    """Whether the first sample is off by a notable part of the largest error: a motion that magnifies the errors of a
-    method may look like one from another start.
-    """
-    early, errors = run.at(run.rows[:1]).errors(first), run.errors(run.supposed(run.times))
-    return bool(early.max() >= _AT_ONCE * errors.max())
 
 
 def another_top(run: Examined) -> Iterator[Hypothesis]:

@@ -15,12 +15,7 @@ from flint import arb
 from heavytop import written_numbers
 from heavytop.errors import InputError, prefixed, quoted
 from heavytop.exact.flint.balls import midpoint, working_precision
-from heavytop.features.score.trajectories.logs import (
-    canonical,
-    quaternions_of,
-    quaternions_of_vectors,
-    with_quaternion,
-)
+from heavytop.features.score.trajectories.logs import canonical, of_rodrigues, of_rotation_vector, with_quaternion
 from heavytop.features.score.trajectories.observed import RawStart
 from heavytop.measure.attitude_error import FRAMES, WIDTHS, Convention
 from heavytop.precision import Vector, dot, exact, log10, vector
@@ -434,7 +429,7 @@ def columns(document: Mapping[str, Any], said: Convention) -> ColumnTable:
     return table
 
 
-_TO_QUATERNION = {"rodrigues": quaternions_of, "rotation_vector": quaternions_of_vectors}
+_TO_QUATERNION = {"rodrigues": of_rodrigues, "rotation_vector": of_rotation_vector}
 
 
 def _of_table(document: Mapping[str, Any], said: Convention) -> ColumnTable:
@@ -459,16 +454,19 @@ def _of_table(document: Mapping[str, Any], said: Convention) -> ColumnTable:
         if quantity in header.units and quantity != "position":  # of which the body decides
             units[name] = header.units[quantity]
     values: dict[str, list[tuple[Fraction, ...] | None]] = {n: [] for n in (*WIDTHS, *_TO_QUATERNION) if n in places}
+    prefixes = {"quaternion": "q", "matrix": "R", "position": "", "euler": "euler"}
+    named = {name: [(f"{prefixes.get(name, name)}{part}", place) for part, place in places[name]] for name in values}
     for number, row in zip(lines, cells, strict=True):
         for name in values:
-            values[name].append(_whole(cell(row[p], f"Line {number}, column {n}") for n, p in _named(places, name)))
+            values[name].append(_whole(cell(row[p], f"Line {number}, column {n}") for n, p in named[name]))
     texts = [row[distance] for row in cells for name in values for _, distance in places[name]]
     for name, unit in units.items():
         values[name] = _times(unit.factor(max(map(len, texts), default=0)), values[name])
     for name in _TO_QUATERNION.keys() & values.keys():
         if "quaternion" in values:
             raise InputError(f"A quaternion and the {_words(name)} both give the attitude.", "Give one of them.")
-        values["quaternion"] = _TO_QUATERNION[name](values.pop(name) or [], last)
+        quaternions = [row and _TO_QUATERNION[name](row) for row in values.pop(name)]
+        values["quaternion"] = [q and ((*q[1:], q[0]) if last else q) for q in quaternions]
     return ColumnTable(values, texts, [f"line {number}" for number in lines])
 
 
@@ -497,11 +495,6 @@ def in_unit_of_body(table: ColumnTable, header: Header | None, said: Convention,
     if off(unit.size) >= off(Fraction(1)):
         return table
     return replace(table, values={**table.values, "position": _times(unit.size, rows)})
-
-
-def _named(places: Mapping[str, list[tuple[str, int]]], name: str) -> list[tuple[str, int]]:
-    prefix = {"quaternion": "q", "matrix": "R", "position": "", "euler": "euler"}.get(name, name)
-    return [(f"{prefix}{component}", index) for component, index in places[name]]
 
 
 def _whole(values: Any) -> tuple[Fraction, ...] | None:

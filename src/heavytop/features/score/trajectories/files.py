@@ -394,10 +394,8 @@ def _text_of(path: Path, content: bytes) -> str:
     suffix = path.suffix.lower()
     if suffix in bags.SUFFIXES:
         return bags.of_bag(path)
-    return logs.of_arrays(content, suffix) if suffix in _ARRAYS else _decoded(content)
-
-
-def _decoded(content: bytes) -> str:
+    if suffix in _ARRAYS:
+        return logs.of_arrays(content, suffix)
     return content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
 
 
@@ -479,7 +477,10 @@ def _observed(document: dict[str, Any], stem: str, case: Case | None, normalize:
         require_case(case, body, case.start, which, None)
     elif case is not None and isinstance(body, Body):
         require_body(case, body)
-    raw = _raw_start(document, table, not times[0], said, case, not body.weight)
+    if case is not None and not document.keys() & {"omega", "gamma", *observed_columns.STARTS}:
+        raw = RawStart("gamma", case.start.gamma, case.start.omega)
+    else:
+        raw = observed_columns.start(document, table, not times[0], said, not body.weight)
     precision = _precision(document, table.texts)
     quantities, rows = observed(body, raw, said, table.values, table.places, precision, normalize)
     top, start = quantities.posed.top, quantities.posed.start
@@ -521,20 +522,6 @@ def _about(document: dict[str, Any], stem: str, case: Case | None, broken: bool)
         "format_guessed": "precision" not in document and "bits" not in document,
         "cut": document.get("cut", ""),
     }
-
-
-def _raw_start(
-    document: dict[str, Any],
-    table: observed_columns.ColumnTable,
-    at_start: bool,
-    said: Any,
-    case: Case | None,
-    free: bool,
-) -> RawStart:
-    """The start of the file, or of the case where the file says nothing of it."""
-    if case is not None and not document.keys() & {"omega", "gamma", *observed_columns.STARTS}:
-        return RawStart("gamma", case.start.gamma, case.start.omega)
-    return observed_columns.start(document, table, at_start, said, free)
 
 
 def _body(document: dict[str, Any], case: Case | None) -> AnyBody:

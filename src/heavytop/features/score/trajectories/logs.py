@@ -14,7 +14,10 @@ from fractions import Fraction
 from io import BytesIO
 from typing import Any
 
+from flint import arb, fmpq
+
 from heavytop.errors import InputError, quoted
+from heavytop.exact.flint.balls import midpoint, working_precision
 from heavytop.extras import require_extra
 from heavytop.precision import decimal_text, exact_text
 
@@ -250,35 +253,20 @@ def _repeats(count: int) -> list[str]:
     return [f"{count} rows that repeat the one before are left out"] if count else []
 
 
-def quaternions_of(parameters: Sequence[Sequence[Fraction] | None], scalar_last: bool) -> list[Any]:
-    """Quaternions of modified Rodrigues parameters σ: ((1 − σ²), 2σ)/(1 + σ²); the shadow set is the same rotation."""
-    return [None if s is None else _ordered(_of_rodrigues(s), scalar_last) for s in parameters]
-
-
-def _of_rodrigues(s: Sequence[Fraction]) -> tuple[Fraction, ...]:
+def of_rodrigues(s: Sequence[Fraction]) -> tuple[Fraction, ...]:
+    """The quaternion of modified Rodrigues parameters σ: ((1 − σ²), 2σ)/(1 + σ²); the shadow set is the same."""
     square = sum((value * value for value in s), Fraction(0))
     return ((1 - square) / (1 + square), *(2 * value / (1 + square) for value in s))
 
 
-def quaternions_of_vectors(vectors: Sequence[Sequence[Fraction] | None], scalar_last: bool) -> list[Any]:
-    """Quaternions of rotation vectors v, the axis times the angle: (cos |v|/2, sin(|v|/2) v/|v|), to 50 digits."""
-    from flint import arb, fmpq
-
-    from heavytop.exact.flint.balls import midpoint, working_precision
-
-    def quaternion(v: Sequence[Fraction]) -> tuple[Fraction, ...]:
-        if not any(v):
-            return Fraction(1), Fraction(0), Fraction(0), Fraction(0)
-        with working_precision(240):
-            half = arb(sum(fmpq(x.numerator, x.denominator) ** 2 for x in v)).sqrt() / 2
-            sine = midpoint(half.sin() / (2 * half))
-            return midpoint(half.cos()), *(sine * x for x in v)
-
-    return [None if v is None else _ordered(quaternion(v), scalar_last) for v in vectors]
-
-
-def _ordered(q: tuple[Fraction, ...], scalar_last: bool) -> tuple[Fraction, ...]:
-    return (*q[1:], q[0]) if scalar_last else q
+def of_rotation_vector(v: Sequence[Fraction]) -> tuple[Fraction, ...]:
+    """The quaternion of a rotation vector v, the axis times the angle: (cos |v|/2, sin(|v|/2) v/|v|), to 50 digits."""
+    if not any(v):
+        return Fraction(1), Fraction(0), Fraction(0), Fraction(0)
+    with working_precision(240):
+        half = arb(sum(fmpq(x.numerator, x.denominator) ** 2 for x in v)).sqrt() / 2
+        sine = midpoint(half.sin() / (2 * half))
+        return midpoint(half.cos()), *(sine * x for x in v)
 
 
 _KINDS = ("QUATERNION", "QUATERNION/RATE", "QUATERNION/ANGVEL")

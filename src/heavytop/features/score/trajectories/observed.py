@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import chain
 from math import isqrt
 from typing import Any
 
@@ -14,6 +15,7 @@ from heavytop import written_numbers
 from heavytop.arguments import MOST_STATES, bits_of, component
 from heavytop.errors import InputError, prefixed
 from heavytop.features.score.diagnose.readings import GivenStart, Reading, Seen, body_data
+from heavytop.features.score.diagnose.samples import floats
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.attitude_error import Convention, Posed, space_to_body
 from heavytop.precision import (
@@ -27,7 +29,7 @@ from heavytop.precision import (
     round_to,
     shown,
 )
-from heavytop.top.attitude import Angle, Attitude, perpendicular, quaternion_products
+from heavytop.top.attitude import Angle, Attitude, perpendicular, quaternion_products, rotated
 from heavytop.top.bodies import CENTRE, IDENTITY, Body
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, VARIABLES, System, system_of
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
@@ -236,14 +238,6 @@ def require_rows(form: str, rows: Sequence[Sequence[Fraction] | None], places: S
             require_rotation(form, row, _FAR, f"The {form} of {index}")
 
 
-def body_omega(raw: RawStart, said: Convention, rows: Rows) -> Vector:
-    """Ω at t = 0 in body axes."""
-    if not raw.in_space:
-        return raw.omega
-    a, b, c = space_to_body(rows, said.upright(raw.omega))
-    return a, b, c
-
-
 def raw_start(start: State) -> RawStart:
     """The start of a program: by its attitude where it has one, else by γ."""
     omega = start.omega if start.omega_space is None else start.omega_space
@@ -414,13 +408,12 @@ class Observed:
         try:
             columns = {name: numpy.array(rows, dtype=float) for name, rows in self.columns.items()}
             body, point = body_data(self.body), self.said.point
-            pivot = numpy.array([float(v) for v in self.said.pivot])
-            start = _start(self.start, self.posed)
+            pivot, start = floats(self.said.pivot), _start(self.start, self.posed)
         except OverflowError:
             return None
         if not all(numpy.isfinite(values).all() for values in columns.values()):
             return None
-        of = body.centre if point is None else numpy.array([float(v) for v in point])
+        of = body.centre if point is None else floats(point)
         count = min(map(len, columns.values()), default=0)
         said = Reading.of(self.said)
         if self.start.form == "euler" and self.start.degrees != said.degrees and "euler" not in columns:
@@ -429,16 +422,12 @@ class Observed:
 
 
 def _start(raw: RawStart, posed: Posed) -> GivenStart:
-    omega = numpy.array([float(value) for value in raw.omega])
     if raw.form != "gamma":
-        return GivenStart(raw.form, numpy.array([float(value) for value in raw.values]), omega, raw.in_space)
+        return GivenStart(raw.form, floats(raw.values), floats(raw.omega), raw.in_space)
     assert posed.xi is not None
-    rows = [_given(posed, v) for v in (posed.xi, cross(posed.start.gamma, posed.xi), posed.start.gamma)]
-    return GivenStart("rows", numpy.array(rows, dtype=float).reshape(-1), omega, raw.in_space)
-
-
-def _given(posed: Posed, principal_vector: Sequence[Fraction]) -> list[float]:
-    return [float(sum(a * v for a, v in zip(row, principal_vector, strict=True))) for row in posed.axes]
+    principal = posed.xi, cross(posed.start.gamma, posed.xi), posed.start.gamma
+    rows = [rotated(posed.axes, vector) for vector in principal]
+    return GivenStart("rows", floats([entry for row in rows for entry in row]), floats(raw.omega), raw.in_space)
 
 
 def posed(
@@ -448,7 +437,7 @@ def posed(
     body, start = rounded_body(body, precision), raw.rounded(precision)
     top, axes = in_principal_axes(body, precision.bits + _SPARE_BITS)
     rows = rotation(start, said, precision, normalize)
-    omega = body_omega(start, said, rows)
+    omega = space_to_body(rows, said.upright(start.omega)) if start.in_space else start.omega
     in_principal = [space_to_body(axes, v) for v in (omega, rows[2], rows[0])]
     w, gamma, xi = (_triple(v) for v in in_principal)
     return body, start, Posed(top, State(w, gamma), xi, axes, body.centre)
@@ -472,9 +461,8 @@ def observed(
     for form in ("quaternion", "matrix"):
         if form in rounded:
             require_rows(form, rounded[form], places, normalize)
-    count = max(map(len, rounded.values()))
-    rows = [_joined([part[i] for part in rounded.values()]) for i in range(count)]
-    done = next((i for i, row in enumerate(rows) if row is None), count)
+    rows = [tuple(chain(*filter(None, parts))) if all(parts) else None for parts in zip(*rounded.values(), strict=True)]
+    done = next((i for i, row in enumerate(rows) if row is None), len(rows))
     columns = {name: [row for row in part[:done] if row is not None] for name, part in rounded.items()}
     if normalize:
         columns = {name: _normalized(name, part, said) for name, part in columns.items()}
@@ -499,15 +487,6 @@ def unit(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
     square, scale = sum(value * value for value in scaled), 1 << 128
     length = Fraction(isqrt(int(square * scale * scale)), scale)
     return tuple(Fraction(round(value / length * scale), scale) for value in scaled)
-
-
-def _joined(parts: Sequence[tuple[Fraction, ...] | None]) -> tuple[Fraction, ...] | None:
-    joined: list[Fraction] = []
-    for part in parts:
-        if part is None:
-            return None
-        joined += part
-    return tuple(joined)
 
 
 def of_observed_arrays(
