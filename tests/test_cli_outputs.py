@@ -6,7 +6,6 @@ import re
 import resource
 import shutil
 import subprocess
-import sys
 from fractions import Fraction
 from pathlib import Path
 
@@ -244,8 +243,7 @@ def test_a_full_disk_leaves_the_file_of_before_and_no_part_of_another(
 @pytest.mark.slow
 def test_the_command_itself_prints_latex_and_names_itself(tmp_path: Path) -> None:
     options = [part for name, value in DATA.items() for part in (f"--{name}", value)]
-    command = [sys.executable, "-m", "heavytop", "reference", *options, "--csv", "a.csv", "--latex"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True, timeout=60)
+    done = in_process.heavytop("reference", *options, "--csv", "a.csv", "--latex", cwd=tmp_path)
     assert done.stdout.startswith("% command: heavytop reference --inertia 2,2,1 ")
     assert "# command: heavytop reference --inertia 2,2,1 " in (tmp_path / "a.csv").read_text()
     assert done.stderr.endswith("heavytop: wrote a.csv\n")

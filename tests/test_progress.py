@@ -179,8 +179,8 @@ def test_every_command_says_once_where_it_is_when_it_takes_long(
     folder.mkdir()
     store.write(report, folder)
     for words in (
-        ["propagate", *data, "3e4"],
-        ["reference", *data, "3", "--digits", "300"],
+        ["propagate", *data, "3e3"],
+        ["reference", *data, "3", "--digits", "60"],
         ["list"],
         ["show", folder],
     ):

@@ -18,8 +18,10 @@ import heavytop as ht
 from heavytop.errors import InputError, NotAsked, OutOfTime
 from heavytop.features.kinds import KINDS
 from heavytop.guard import how_it_ended, stopwatch
+from heavytop.harness.checkpoint import Saved
 from heavytop.harness.limited import RowLimits
 from heavytop.harness.plan import read
+from heavytop.harness.rows import measure
 from heavytop.records import Row
 from heavytop.report.compare.noise import Policy
 from support.helpers import without_progress
@@ -155,9 +157,8 @@ def test_whatever_ends_a_run_ends_what_it_started(tmp_path: Path, end: int) -> N
 @pytest.mark.slow
 def test_what_an_integrator_declares_that_it_cannot_do_is_no_failure(tmp_path: Path) -> None:
     def measured(precision: str) -> ht.Report:
-        tasks = read(str(plan(tmp_path, "mine.py:forward", precision=precision)), KINDS)[2]
-        found = [row for _, row in rows(tasks, 1)]
-        return ht.Report("heavytop-report/2", {"name": "p"}, {}, found)
+        (task,) = read(str(plan(tmp_path, "mine.py:forward", precision=precision)), KINDS)[2]
+        return ht.Report("heavytop-report/2", {"name": "p"}, {}, [measure(KINDS["drift"], task, Saved())])
 
     lacking, able = measured("quad"), measured("double")
     assert [row.outcome for row in (*lacking.rows, *able.rows)] == ["unsupported", "success"]
@@ -299,7 +300,7 @@ def test_an_integrator_that_ran_out_of_time_twice_is_not_asked_a_third_time(tmp_
 
 def test_what_was_not_asked_is_no_number_and_the_same_as_what_ran_out_of_time(tmp_path: Path) -> None:
     (task,) = read(str(plan(tmp_path, "mine.py:solve")), KINDS)[2]
-    (good,) = (row for _, row in rows([task], 1))
+    good = measure(KINDS["drift"], task, Saved())
     late, unasked = (failed_row(task, "slow", kind) for kind in (OutOfTime, NotAsked))
 
     def verdict(old: Row, new: Row) -> int:

@@ -219,12 +219,18 @@ def cluster() -> Iterator[str]:
 
 
 @pytest.fixture
-def worker_pids(cluster: str) -> Iterator[Callable[[], list[int]]]:
+def worker_pids(cluster: str) -> Iterator[Callable[..., list[int]]]:
+    """The processes of the workers; of those alone that have a task where ``busy``."""
     from distributed import Client
 
     with Client(cluster, set_as_default=False) as client:
         client.wait_for_workers(2, timeout=30)
-        yield lambda: list(client.run(os.getpid).values())
+
+        def pids(busy: bool = False) -> list[int]:
+            tasks = client.processing() if busy else {}
+            return [pid for address, pid in client.run(os.getpid).items() if not busy or tasks.get(address)]
+
+        yield pids
 
 
 dask = pytest.mark.filterwarnings("default")
@@ -280,8 +286,8 @@ def test_a_row_whose_workers_die_one_after_the_other_is_named(tmp_path: Path, cl
     stop = threading.Event()
 
     def keep_killing() -> None:
-        while not stop.wait(2):
-            for pid in worker_pids():
+        while not stop.wait(0.5):
+            for pid in worker_pids(busy=True):
                 kill(pid)
 
     killer = threading.Thread(target=keep_killing)

@@ -1,9 +1,9 @@
 """Motions computed elsewhere: scored like our own, read with suspicion."""
 
+import io
 import json
 import os
 import re
-import subprocess
 import sys
 from fractions import Fraction
 from pathlib import Path
@@ -42,11 +42,6 @@ def as_csv(given: dict, number=str) -> str:
     lines += [f"# {key}: {', '.join(given[key])}" for key in ("inertia", "centre", "omega", "gamma")]
     rows = zip(given["times"], given["states"], strict=True)
     return "\n".join([*lines, HEADER, *(",".join([t, *map(number, state)]) for t, state in rows)]) + "\n"
-
-
-def started(*arguments: str, **options) -> subprocess.CompletedProcess[str]:
-    line = [sys.executable, "-m", "heavytop", *arguments]
-    return subprocess.run(line, capture_output=True, text=True, timeout=120, check=False, **options)
 
 
 command = in_process.heavytop
@@ -237,11 +232,12 @@ def test_what_no_body_has_and_states_in_another_order_are_warnings(tmp_path: Pat
 
 
 @pytest.mark.slow
-def test_the_command_scores_writes_a_report_and_pipes(tmp_path: Path) -> None:
+def test_the_command_scores_writes_a_report_and_pipes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     options = ["--inertia", "5/2,5/2,3/2", "--weight", "2", "--centre", "0,0,3/4", "--omega", "1/5,-1/3,7/4"]
     options += ["--gamma", "2/7,3/7,6/7", "--times", "1,5", "--json"]
-    made = started("propagate", *options)
-    piped = started("score", "-", "--json", input=made.stdout)
+    made = command("propagate", *options)
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(made.stdout.encode())))
+    piped = command("score", "-", "--json")
     assert piped.returncode == 0, piped.stderr
     assert json.loads(piped.stdout)["digits_kept"] > 14
     file = tmp_path / "motion.json"

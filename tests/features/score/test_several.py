@@ -9,7 +9,7 @@ import pytest
 
 from heavytop.errors import ExitCode
 from heavytop.features.score.diagnose.search import Diagnosis
-from heavytop.features.score.several import ScoredFile, exit_code, orders, text
+from heavytop.features.score.several import ScoredFile, _scored_file, exit_code, orders, text
 from heavytop.features.score.text import cause
 from support.in_process import heavytop
 
@@ -55,14 +55,16 @@ def test_files_are_scored_in_parallel_and_a_bad_one_does_not_stop_the_others(tmp
         (tmp_path / f"{name}.csv").write_text(HEAD.format("mine", step) + ROWS.format(off))
     (tmp_path / "bad.csv").write_text("none\n")
     paths = [str(tmp_path / f"{name}.csv") for name in ("coarse", "bad", "fine")]
-    done = heavytop("score", paths[0], paths[2], "--require", "4.3")
-    assert done.returncode == ExitCode.FINDING
-    assert done.stdout.splitlines()[-2].endswith("coarse.csv: 4.3 digits are required: 4 are right.")
-    assert done.stdout.splitlines()[-1].endswith("fine.csv: 4.3 digits are required: they are right.")
-    done = heavytop("score", *paths, "--json")
+    required = [_scored_file(path, None, "4.3", False) for path in (paths[0], paths[2])]
+    assert exit_code(required) == ExitCode.FINDING
+    coarse, fine = text(required).splitlines()[-2:]
+    assert coarse.endswith("coarse.csv: 4.3 digits are required: 4 are right.")
+    assert fine.endswith("fine.csv: 4.3 digits are required: they are right.")
+    done = heavytop("score", *paths, "--require", "4.3", "--json")
     assert done.returncode == ExitCode.BAD_INPUT
     document = json.loads(done.stdout)
     assert [each["file"] for each in document["files"]] == paths
+    assert [each.get("passed") for each in document["files"]] == [False, None, True]
     assert document["files"][0]["digits_right"] == pytest.approx(4, abs=0.1)
     assert "no row below its header" in document["files"][1]["error"]
     (order,) = document["orders"]
