@@ -105,14 +105,6 @@ def test_several_forms_of_one_motion_agree():
             assert all(a.overlaps(b) for a, b in zip(states[0], other, strict=True))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("case", SAMPLES, ids=lambda case: case.__name__)
-def test_the_validated_enclosure_agrees_to_fifty_digits_at_ten(case):
-    sample = SAMPLES[case]
-    for a, b in zip(sample.state(F(10), 168), Validated(sample.top, sample.start).state(F(10), 168), strict=True):
-        assert a.overlaps(b)
-
-
 def test_a_generic_motion_is_left_to_the_enclosure():
     top, start = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5")), State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
     assert kind(find(top, start)) is Validated

@@ -6,8 +6,6 @@ from fractions import Fraction
 from pathlib import Path
 from time import process_time
 
-import mpmath
-import numpy as np
 import pytest
 from flint import arb
 
@@ -20,7 +18,7 @@ from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.enclosure.step import quadratic
 from heavytop.exact.flint.balls import midpoint, radius, relative_bits, working_precision
 from heavytop.measure.certify import bits_of
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System, area, energy, gamma_squared
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 VECTORS = json.loads((Path(__file__).parents[1] / "data" / "vectors.json").read_text(encoding="utf-8"))
@@ -30,15 +28,6 @@ BITS_OF_60_DIGITS = 200
 def motion(vector, system=HEAVY_TOP):
     top = HeavyTop(vector["inertia"], vector["weight"], vector["centre"])
     return Validated(top, State(vector["omega"], vector["gamma"]), system)
-
-
-def random_motion(rng):
-    def some(low, high):
-        return Fraction(rng.randint(low, high), rng.randint(7, 13))
-
-    top = HeavyTop([some(5, 30) for _ in range(3)], some(-9, 9), [some(-9, 9) for _ in range(3)])
-    state = State([some(-14, 14) for _ in range(3)], [some(-9, 9), some(-9, 9), some(1, 9)])
-    return Validated(top, state.normalized(24))
 
 
 def holds(balls, vector):
@@ -66,70 +55,6 @@ def test_a_wrong_sign_in_the_field_is_caught_by_the_reference_states():
     fault = System("heavy_top", reversed_gamma, HEAVY_TOP.angular_velocity)
     balls = motion(VECTORS[0], fault).state(Fraction(VECTORS[0]["time"]), BITS_OF_60_DIGITS)
     assert not holds(balls, VECTORS[0])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("time", [Fraction(-31, 7), Fraction(1, 3), Fraction(6)])
-@pytest.mark.parametrize(
-    "known",
-    [DeloneHomoclinic(Fraction(3, 5), Fraction(7, 4)), ErshkovPartial(Fraction(1, 2), Fraction(2), Fraction(1))],
-)
-def test_balls_agree_with_hyperbolic_closed_forms_of_both_systems(known, time):
-    enclosed = Validated(known.top, known.start, known.system).state(time, 330)
-    for ball, true in zip(enclosed, known.state(time, 400), strict=True):
-        assert ball.overlaps(true)
-        assert relative_bits(ball) >= 330
-
-
-@pytest.mark.slow
-def test_random_motions_agree_with_mpmath_to_40_digits():
-    rng = random.Random(20)
-    for _ in range(2):
-        solution = random_motion(rng)
-        time = Fraction(rng.choice([-1, 1]) * rng.randint(5, 15), 11)
-        with mpmath.workdps(50):
-            p = solution.parameters._replace(
-                inertia=[mpmath.mpf(x.numerator) / x.denominator for x in solution.top.inertia],
-                moment=[mpmath.mpf(x.numerator) / x.denominator for x in solution.top.moment],
-            )
-            sign = 1 if time > 0 else -1
-            other = mpmath.odefun(
-                lambda _t, y, p=p, sign=sign: [sign * rate for rate in HEAVY_TOP.field(p, y)],
-                0,
-                [mpmath.mpf(x.numerator) / x.denominator for x in solution.start.flat],
-            )(mpmath.mpf(abs(time).numerator) / time.denominator)
-            for ball, value in zip(solution.state(time, 160), other, strict=True):
-                middle = midpoint(ball)
-                assert abs(mpmath.mpf(middle.numerator) / middle.denominator - value) < mpmath.mpf(10) ** -40
-
-
-def test_first_integrals_of_the_enclosure_hold_the_exact_value():
-    rng = random.Random(21)
-    for _ in range(4):
-        solution = random_motion(rng)
-        balls = solution.state(Fraction(rng.randint(20, 60), 7), 150)
-        with working_precision(220):
-            p = solution.parameters._replace(
-                inertia=[arb(x.numerator) / x.denominator for x in solution.top.inertia],
-                moment=[arb(x.numerator) / x.denominator for x in solution.top.moment],
-            )
-            for integral in (gamma_squared, area, energy):
-                exact = integral(solution.parameters, solution.start.flat)
-                drift = integral(p, balls) - arb(exact.numerator) / exact.denominator
-                assert drift.contains(0)
-                assert drift.rad() < 1e-35
-
-
-@pytest.mark.slow
-def test_forward_and_back_returns_to_the_start():
-    solution = random_motion(random.Random(22))
-    time = Fraction(9, 2)
-    there = solution.state(time, 240)
-    arrived = State(*(tuple(midpoint(b) for b in there[i : i + 3]) for i in (0, 3)))
-    back = Validated(solution.top, arrived).state(-time, 200)
-    for ball, start in zip(back, solution.start.flat, strict=True):
-        # the motion back starts within 2^-240 of the true state, and grows apart by far less than 2^40 on the way
-        assert abs(midpoint(ball) - start) < Fraction(1, 2**195)
 
 
 def test_the_series_solves_the_equations_and_starts_at_the_state():
@@ -176,32 +101,6 @@ def test_taylor_coefficients_of_a_known_motion_obey_the_a_priori_bound():
             for y, true in zip(series, known.state(step, 100), strict=True):
                 value = sum((y[n] * arb(step.numerator) ** n / arb(step.denominator) ** n for n in range(20)), arb(0))
                 assert abs(midpoint(value) - midpoint(true)) <= tail
-
-
-def test_the_set_of_errors_holds_neighbouring_motions():
-    """Starts in the corners of the ball at time 0 stay inside the ball at later times: what the frames are for."""
-    vector = VECTORS[0]
-    solution = motion(vector)
-    p = solution.parameters
-    field = quadratic(lambda y: HEAVY_TOP.field(p, y), 6)
-    precision = 120
-    wide = enclosure.start_node(field, solution.start.flat, precision)
-    size = 1 << 60
-    wide = enclosure.Node(wide.time, wide.centre, enclosure.Errors(np.eye(6), np.full(6, float(size)), 0), 3)
-    rng = random.Random(24)
-    starts = [tuple(Fraction(int(c) + rng.choice([-size, size]), 2**precision) for c in wide.centre) for _ in range(4)]
-    node = wide
-    while node.time < 6:
-        node = enclosure.step(field, node, precision).end()
-    last = enclosure.step(field, node, precision)
-    with working_precision(200):
-        balls = last.at(Fraction(1, 3))
-        widest = max(radius(b) for b in balls)
-        assert widest < Fraction(2**12 * size, 2**precision)
-        for start in starts:
-            neighbour = Validated(solution.top, State(start[:3], start[3:]))
-            for ball, value in zip(balls, neighbour.state(node.time + last.length / 3, 150), strict=True):
-                assert abs(midpoint(value) - midpoint(ball)) <= radius(ball) + Fraction(1, 2**140)
 
 
 def test_balls_do_not_depend_on_what_was_asked_before():

@@ -240,18 +240,6 @@ def test_a_rotor_of_any_size_is_enclosed_and_integrated(power) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("units", [F(10) ** -90, F(10) ** 90])
-def test_moments_weight_and_rotor_times_a_factor_are_the_same_motion(units) -> None:
-    inertia, k = ([units * value for value in part] for part in (CASE.top.inertia, CASE.top.rotor or ()))
-    other = HeavyTop(inertia, units * CASE.top.weight, CASE.top.centre, k)
-    one, same = (Validated(top, CASE.start, HEAVY_GYROSTAT).state(F(2), 100) for top in (CASE.top, other))
-    assert all(a.overlaps(b) for a, b in zip(one, same, strict=True))
-    for name in ("words", "heyoka"):
-        a, b = (ht.propagate(top, CASE.start, [2], integrator=name).to_numpy() for top in (CASE.top, other))
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-14)
-
-
-@pytest.mark.slow
 def test_a_body_at_rest_is_set_turning_by_its_weight_alone_and_a_rotor_alone_leaves_it_at_rest() -> None:
     top = HeavyTop((3, 2, 1), 0, (0, 0, 1), (1, 2, 3))
     still = State((0, 0, 0), (0, 0, -1))
@@ -263,21 +251,6 @@ def test_a_body_at_rest_is_set_turning_by_its_weight_alone_and_a_rotor_alone_lea
     assert find(falling, still, HEAVY_GYROSTAT).method.startswith("validated")
 
 
-@pytest.mark.slow
-def test_permanent_rotations_are_found_and_carry_the_attitude() -> None:
-    """About γ at the rate ω, M = IΩ + k and γ × (ω² Iγ + ω k − n) = 0: any k with n = ω² Iγ + ω k + κ γ."""
-    gamma, rate = (F(2, 3), F(-1, 3), F(2, 3)), F(3, 2)
-    inertia, k = (F(3), F(2), F(1)), (F(1, 2), F(-1), F(1, 3))
-    n = [rate**2 * i * g + rate * c + g / 7 for i, g, c in zip(inertia, gamma, k, strict=True)]
-    top, start = HeavyTop(inertia, 1, n, k), State([rate * g for g in gamma], gamma)
-    known = find(top, start, HEAVY_GYROSTAT)
-    assert isinstance(known, Staude)
-    assert [_fraction(ball.mid()) for ball in known.attitude(F(0), 80)]
-    enclosed = Validated(top, start, HEAVY_GYROSTAT).attitude(F(2), 80)
-    assert all(a.overlaps(b) for a, b in zip(known.attitude(F(2), 80), enclosed, strict=True))
-    assert not isinstance(find(HeavyTop(inertia, 1, n, (0, 0, 0)), start, HEAVY_GYROSTAT), Staude)
-
-
 def test_integrals_are_those_of_the_system_that_the_top_tells() -> None:
     top, start = HeavyTop((3, 2, 1), 0, (0, 0, 0), (0, 0, 1)), CASES["euler"].start
     names = [integral.name for integral in ht.holding(top, start)]
@@ -285,33 +258,6 @@ def test_integrals_are_those_of_the_system_that_the_top_tells() -> None:
     assert names[:4] == ["gamma_squared", "area", "energy", "momentum_squared"]
     with pytest.raises(InputError, match="rotor"):
         ht.holding(top, start, ht.HEAVY_TOP)
-
-
-@pytest.mark.parametrize(
-    "name", ["kovalevskaya", "goryachev-chaplygin", "hess", "lagrange", "euler", "steklov", "dokshevich", "delone"]
-)
-def test_a_heavy_gyrostat_without_momentum_has_the_closed_forms_of_the_heavy_top(name) -> None:
-    case = CASES[name]
-    top = HeavyTop(case.top.inertia, case.top.weight, case.top.centre, (0, 0, 0))
-    found, known = find(top, case.start, HEAVY_GYROSTAT), find(case.top, case.start)
-    assert found.method.startswith("closed form")
-    for a, b in zip(found.state(Fraction(7, 3), 140), known.state(Fraction(7, 3), 140), strict=True):
-        assert a.overlaps(b)
-
-
-def test_no_closed_form_of_the_heavy_top_is_taken_for_a_top_with_a_rotor() -> None:
-    """Each would forget k: of a top with weight the enclosure is the only one, and the heavy top refuses the data."""
-    for name in ("euler", "lagrange", "kovalevskaya", "goryachev-chaplygin", "hess"):
-        if name not in CASES:
-            continue
-        case = CASES[name]
-        top = HeavyTop(case.top.inertia, case.top.weight, case.top.centre, ("1/10", "1/7", "1/3"))
-        known = "validated" if any(case.top.moment) else "closed form: Zhukovsky-Volterra"
-        assert find(top, case.start, HEAVY_GYROSTAT).method.startswith(known)
-        with pytest.raises(InputError, match="rotor"):
-            find(top, case.start)
-        with pytest.raises(InputError, match="rotor"):
-            ht.reference(top, case.start, [1], system="heavy_top")
 
 
 def test_a_motion_that_turns_by_its_rotor_alone_is_refused_beyond_reach() -> None:

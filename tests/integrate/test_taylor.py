@@ -8,28 +8,13 @@ import pytest
 from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.motions import Stepper, propagate
 from heavytop.integrate.trajectory import Outcome, Problem
-from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, real
+from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
-from support.helpers import VECTORS, start_of, top_of
 
 TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
 START = State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5"))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("precision", "limit"),
-    [(DOUBLE, "1e-14"), (EXTENDED, "1e-17"), (QUAD, "1e-31"), (real(237), "1e-58")],
-    ids=lambda value: getattr(value, "name", value),
-)
-@pytest.mark.parametrize("given", VECTORS, ids=lambda given: given["name"])
-def test_every_reference_state_is_met_in_every_format(given, precision, limit: str) -> None:
-    run = propagate(top_of(given), start_of(given), [given["time"]], precision)
-    assert run.outcome is Outcome.SUCCESS
-    off = max(abs(exact(value) - Fraction(text)) for value, text in zip(run.states[0], given["state"], strict=True))
-    assert off <= Fraction(limit)
 
 
 def bits(run) -> list[list[Fraction]]:

@@ -72,17 +72,15 @@ def _middle(ball) -> Fraction:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("precision", "limit"),
-    [(DOUBLE, "1e-14"), (EXTENDED, "1e-17"), (DOUBLE_DOUBLE, "1e-29"), (QUAD, "1e-31"), (real(237), "1e-58")],
-    ids=lambda value: getattr(value, "name", value),
-)
+@pytest.mark.parametrize(("integrate", "precision"), EVERY_FORMAT)
 @pytest.mark.parametrize("given", VECTORS, ids=lambda given: given["name"])
-def test_every_reference_state_is_met_in_every_format(given, precision: Precision, limit: str) -> None:
-    run = propagate_multiword(top_of(given), start_of(given), [given["time"]], precision)
+def test_every_reference_state_is_met_in_every_format(given, integrate, precision: Precision) -> None:
+    limits = {"double": "1e-14", "extended": "1e-17", "double-double": "1e-29", "quad": "1e-31"}
+    limits |= {"real:100": "1e-27", "real:237": "1e-58"}
+    run = integrate(top_of(given), start_of(given), [given["time"]], precision)
     assert run.outcome is Outcome.SUCCESS
     off = max(abs(a - Fraction(b)) for a, b in zip(bits(run)[0], given["state"], strict=True))
-    assert off <= Fraction(limit)
+    assert off <= Fraction(limits[precision.name])
 
 
 @pytest.mark.slow

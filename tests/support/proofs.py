@@ -135,7 +135,7 @@ def assert_exact(motion, seed, attitude=False):
 
 def assert_enclosed(motion):
     """The validated enclosure meets the closed form on both sides of the start."""
-    enclosure = Validated(motion.top, motion.start, motion.system)
+    enclosure = Validated(motion.top, motion.start, motion.system, rotor=getattr(motion, "rotor", None))
     for time in (Fraction(3, 2), Fraction(-2)):
         assert_overlap(motion.state(time, 180), enclosure.state(time, 180))
 
