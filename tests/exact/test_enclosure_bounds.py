@@ -353,13 +353,21 @@ def test_errors_beyond_what_the_theorem_admits_are_no_step():
     assert step(FIELD, node_with(precision, 2.0 ** (precision - 16)), precision) is None
 
 
-def test_a_start_is_rounded_by_at_most_half_an_ulp():
+def test_a_start_is_rounded_by_at_most_half_an_ulp_and_off_by_what_is_said_of_it():
+    """Half an ulp where that is the rounding, and none of an exact start is paid for."""
     rng = Random(3)
     for _ in range(50):
         start = tuple(Fraction(rng.randint(-99, 99), rng.randint(1, 99)) for _ in SIX)
-        node = start_node(FIELD, start, 70)
-        for value, whole, error in zip(start, node.centre, node.errors.radii, strict=True):
+        start = (Fraction(1, 2**71), *start[1:5], Fraction(3))
+        off = tuple(Fraction(rng.randint(1, 99), rng.randint(1, 99) * 2**60) for _ in SIX)
+        exactly, within = start_node(FIELD, start, 70), start_node(FIELD, start, 70, off)
+        assert exactly.centre == within.centre
+        for value, whole, error, more, beyond in zip(
+            start, exactly.centre, exactly.errors.radii, within.errors.radii, off, strict=True
+        ):
             assert abs(value * 2**70 - int(whole)) <= Fraction(float(error))
+            assert Fraction(float(more)) >= Fraction(float(error)) + beyond * 2**70
+        assert exactly.errors.radii[-1] == 0
 
 
 def test_the_roundings_of_horners_scheme_are_paid_for_where_every_one_is_half_an_ulp():

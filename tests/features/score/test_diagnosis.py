@@ -335,6 +335,10 @@ def test_rounded_states_are_told_where_rounding_is_the_error(digits: int, kind: 
     assert (told.kind, told.numbers) == ("rounded", {"to": kind, "digits": str(digits)})
     if kind == "decimals":  # an error that rounding does not explain
         assert found(top, start, times, spoilt, 100 * error) == []
+    upside_down = spoilt * np.repeat([1.0, -1.0], 3)
+    for off in (2.0, None):
+        told, *_ = found(top, start, times, upside_down, off)
+        assert told.kind == "gamma_down"
     rows = [tuple(Fraction(v) for v in row) for row in y]
     assert roundings(rows, DOUBLE) == []
 
