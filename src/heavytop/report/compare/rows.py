@@ -34,6 +34,7 @@ from heavytop.records import (
 )
 from heavytop.report.compare.noise import (
     BITS,
+    STEP_CONTROL,
     Limits,
     Lookup,
     Policy,
@@ -61,7 +62,7 @@ from heavytop.report.compare.verdicts import (
     size,
     weaker,
 )
-from heavytop.report.document.kind import Kinds, kind_of
+from heavytop.report.document.kind import Kinds, ReportedKind, kind_of
 from heavytop.report.store.checks import (
     contradictions,
     inconsistent,
@@ -230,7 +231,7 @@ def judge_series(old: Series, new: Series, allowed: float, floor: float, exactly
         most = Fraction(allowed) * max(abs(a) for a, _ in values)
         off = any(abs(b - a) > most for a, b in values)
         return (Verdict.WORSE, "a value that must agree does not") if off else SAME
-    sizes = [log_sizes(texts) for texts in (before, after)]
+    sizes = [log_sizes(tuple(texts)) for texts in (before, after)]
     if min(map(min, sizes)) < floor:
         sizes = [[max(size, floor) for size in part] for part in sizes]
     grown = median(map(sub, sizes[1], sizes[0]))
@@ -382,21 +383,12 @@ class RowComparison:
                     yield Finding(key, name, judged[0], None, metric.value, judged[1])
 
     def _metrics(self, key: Identity, old: Row, new: Row) -> list[Finding]:
-        loss = self.lookup.usual.truncation
+        usual, kind = self.lookup.usual, kind_of(old, self.kinds)
+        lost = bool(old.reference.until)
         findings = []
         for name, metric in old.metrics.items():
             match, limits = new.metrics.get(name), self.limits(old, name)
-            if (
-                # most metrics of most reports: two numbers that differ by less than they may under every rule
-                limits is self.lookup.usual
-                and match is not None
-                and metric.log10 is not None
-                and match.log10 is not None
-                and metric.kind == match.kind == "error"
-                and -loss <= metric.log10 - match.log10 <= loss
-                and metric.quantity == match.quantity
-                and (match.band == metric.band or (match.band or 9e9) < (metric.band or 0.0))
-            ):
+            if limits is usual and match is not None and self._is_plainly_same(kind, metric, match, old, new, lost):
                 if self.list_same:
                     findings.append(Finding(key, name, Verdict.SAME, metric.value, match.value))
                 else:
@@ -415,6 +407,29 @@ class RowComparison:
                 if name not in old.metrics and not self.limits(old, name).ignore
             ]
         return findings
+
+    def _is_plainly_same(
+        self, kind: ReportedKind, metric: Metric, match: Metric, old: Row, new: Row, lost: bool
+    ) -> bool:
+        """Whether two errors, as most of most reports, differ by less than they may where no rule is about them.
+
+        Then neither truncation nor the cases of step control matter, which :meth:`_metric` looks at.
+        """
+        before, after, usual = metric.log10, match.log10, self.lookup.usual
+        if before is None or after is None or not metric.kind == match.kind == "error":
+            return False
+        band, own, allowed = metric.band, match.band, usual.truncation
+        if metric.quantity != match.quantity or (own is None and band is not None):
+            return False
+        if -allowed <= before - after <= allowed and (band == own or (own or math.inf) < (band or 0.0)):
+            return True
+        if band is not None and old.starts == new.starts == 1:
+            allowed = max(allowed, min(STEP_CONTROL, usual.noise * allowed_loss(metric, match)))
+        if abs(before - after) > allowed or metric.bound or match.bound or noisier(kind, metric, match, lost):
+            return False
+        if metric.quantity is None or metric.quantity.statistic != "final":
+            return True
+        return abs(max(before, least(old.metrics, metric)) - max(after, least(new.metrics, match))) <= allowed
 
     def _metric(self, metric: Metric, match: Metric, limits: Limits, old: Row, new: Row) -> Judged:
         """The values first, then the noise of the candidate, which is worse where it is more than chance and reaches
@@ -500,7 +515,8 @@ class RowComparison:
         """Findings beside the numbers themselves that make these incomparable."""
         if old.finite and not new.finite:
             yield Finding(key, "", Verdict.WORSE, "finite", "not finite", "a value is no longer finite")
-        if self.policy.flags != "ignore":
+        taken = [(row.steps, row.order, row.evaluations) for row in (old, new)]
+        if self.policy.flags != "ignore" and taken[0] != taken[1]:
             method = [("other steps", old.steps, new.steps, _STEPS), ("another order", old.order, new.order, 1)]
             if old.evaluations is not None:
                 method.insert(1, ("other evaluations of the field", old.evaluations, new.evaluations, _STEPS))
@@ -509,10 +525,10 @@ class RowComparison:
                 if few * factor < many:
                     yield Finding(key, "", Verdict.INCOMPARABLE, str(before), str(after), why)
         fewer = _STEPS if kind_of(old, self.kinds).samples_are_steps else 1
-        needed, taken = -(-_samples(old) // fewer), _samples(new)
-        if taken < needed:
+        samples = _samples(new)
+        if samples < -(-_samples(old) // fewer):
             why = "fewer samples: the largest of them is smaller"
-            yield Finding(key, "", Verdict.INCOMPARABLE, f"{_samples(old)} samples", f"{taken} samples", why)
+            yield Finding(key, "", Verdict.INCOMPARABLE, f"{_samples(old)} samples", f"{samples} samples", why)
         rounded = old.input_rounding
         if rounded is not None and new.input_rounding != rounded:
             eps = exact(2) ** (1 - old.bits)

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from fractions import Fraction
 from functools import lru_cache
-from math import isfinite
 from pathlib import Path
 
 import numpy
@@ -182,12 +181,12 @@ def _against_metrics(quantity: Quantity, series: Series, row: Row) -> Iterator[s
 
 def peak(series: Series) -> float | None:
     """log10 of the largest size among the values of a series, -1e9 for 0; None where none is a number."""
-    numbers = series.values if _NOT_NUMBERS.isdisjoint(series.values) else list(filter(is_number, series.values))
-    with suppress(ValueError):
-        sizes = list(map(abs, map(float, numbers)))
-        if 1e-300 < sum(sizes) < 1e300:
-            return math.log10(max(sizes))
-    return max(map(log_size, numbers), default=None)
+    return max(log_sizes(numbers_of(series)), default=None)
+
+
+def numbers_of(series: Series) -> tuple[str, ...]:
+    """The values of a series that are no words."""
+    return tuple(series.values if _NOT_NUMBERS.isdisjoint(series.values) else filter(is_number, series.values))
 
 
 def ended(series: Series, row: Row) -> bool:
@@ -217,8 +216,14 @@ def is_number(value: str) -> bool:
     return value not in _NOT_NUMBERS
 
 
-def log_sizes(texts: Sequence[str]) -> list[float]:
-    """:func:`log_size` of each number."""
+@lru_cache(1 << 8)
+def log_sizes(texts: tuple[str, ...]) -> list[float]:
+    """log10 |number| of each, -1e9 for 0; raises InputError for text that is not a number.
+
+    The rules that check and compare a row ask it of the same series.
+    """
+    if not _are_plain(texts):
+        return [_floor(log10(exact(text))) for text in texts]
     with suppress(ValueError):
         sizes = list(map(abs, map(float, texts)))
         if 1e-300 < min(sizes) <= sum(sizes) < 1e300:
@@ -232,7 +237,7 @@ def log_size(text: str) -> float:
         size = abs(float(text))
     except ValueError:
         size = 0.0
-    return math.log10(size) if 1e-300 < size < 1e300 else _floor(log10(exact(text)))
+    return math.log10(size) if 1e-300 < size < 1e300 else -1e9 if text == "0" else _floor(log10(exact(text)))
 
 
 def bound(metric: Metric) -> float:
@@ -387,8 +392,10 @@ def _of_metric(metric: Metric, finite: bool) -> Iterator[str]:
 def _of_series(series: Series) -> Iterator[str]:
     if len(series.times) != len(series.values):
         yield "not one value for each time"
-    if not all(map(isfinite, _floats([*series.times, *series.values]))):
-        numbers = (value for value in series.values if value not in WORDS["value"])
+    numbers = numbers_of(series)
+    try:
+        log_sizes(numbers), log_sizes(tuple(series.times))
+    except InputError:
         yield from filter(None, map(_cause, (*series.times, *numbers)))
 
 
@@ -417,8 +424,13 @@ def _doubtful(metrics: Sequence[Metric]) -> set[int]:
 
 def _floats(texts: Sequence[str]) -> list[float]:
     """Numbers, without the cost of exact ones; nan alone for text that is not a number outside Python."""
-    joined = "".join(texts)
     try:
-        return list(map(float, texts)) if joined.isascii() and "_" not in joined else [math.nan]
+        return list(map(float, texts)) if _are_plain(texts) else [math.nan]
     except ValueError:
         return [math.nan]
+
+
+def _are_plain(texts: Iterable[str]) -> bool:
+    """Whether Python reads no more numbers in the texts than :func:`exact` does."""
+    joined = "".join(texts)
+    return joined.isascii() and "_" not in joined

@@ -35,8 +35,8 @@ _UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 _NAME = 200
 _SECONDS = b'"seconds":'
 _decode_seconds = msgspec.json.Decoder(dict[str, Seconds]).decode
-_CHUNK = 100
-"""Rows of a brief report that are checked at once: few, so that they are still in the cache when compared."""
+_CHUNK = 1 << 16
+"""Bytes of a brief report whose rows are checked at once: few, so that they are still in the cache when compared."""
 
 
 def write(report: Report, directory: Path, rows: Iterable[Row] | None = None) -> Path:
@@ -120,8 +120,9 @@ class _Rows:
 
     def __iter__(self) -> Iterator[Row]:
         seen: set[int] = set()
-        for start in range(0, len(self._rows), _CHUNK):
-            numbers = range(start, min(start + _CHUNK, len(self._rows)))
+        at_once = max(1, _CHUNK // len(bytes(self._rows[0]))) if self._rows else 1
+        for start in range(0, len(self._rows), at_once):
+            numbers = range(start, min(start + at_once, len(self._rows)))
             twins = {number: row for number in numbers if (row := self._twin(number)) is not None}
             rows: list[Row] = []
             try:
