@@ -24,7 +24,7 @@ from heavytop.report.render.comparison import comparison
 from heavytop.report.render.export import comparison_junit, comparison_markdown
 from heavytop.report.render.history import _ticks, history_json, history_page, history_text
 from heavytop.report.render.plots import growth
-from heavytop.report.render.text import table
+from heavytop.report.render.text import Lines
 from support.reports import compare, comparison_page, history, replace, report_page, summary
 from support.small_reports import error, report, row
 
@@ -243,7 +243,7 @@ def test_no_number_of_many_columns_is_cut_however_narrow_the_terminal(width: int
         "across",
         "drift of each integral",
     ]
-    text = printed(table(head, [[*run, drifts]], left=True), width)
+    text = printed(Lines(head, [[*run, drifts]], left=True), width)
     for word in [*" ".join(run[:6]).split(), *run[6:], *drifts.split("  ")]:  # no number stands apart from its noise
         assert word in text
 
@@ -251,7 +251,7 @@ def test_no_number_of_many_columns_is_cut_however_narrow_the_terminal(width: int
 @pytest.mark.parametrize("width", [60, 80, 100, 160])
 def test_no_name_is_broken_inside_a_word_however_narrow_the_terminal(width: int) -> None:
     names = ["ershkov-partial-2/backward", "a-very-long-name-of-a-case-nobody-would-like-to-see-broken"]
-    made = table(["case", "format", "largest error"], [[name, "double-double", "1.25e-13 ± 0.31"] for name in names])
+    made = Lines(["case", "format", "largest error"], [[name, "double-double", "1.25e-13 ± 0.31"] for name in names])
     text = printed(made, width)
     for word in (*names, "double-double", "1.25e-13 ± 0.31", "case"):
         assert word in text

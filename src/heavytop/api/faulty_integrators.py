@@ -6,6 +6,7 @@ them as any integrator that is defined outside the registry.  All are for the sy
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -61,33 +62,6 @@ class _ClockInOneWord(_OneByOne):
         self.engine.time = self.engine.dtime[0]
 
 
-def _as_asked(top: HeavyTop) -> HeavyTop:
-    return top
-
-
-def _pulled_upwards(top: HeavyTop) -> HeavyTop:
-    a, b, c = top.centre
-    return HeavyTop(top.inertia, top.weight, (-a, -b, -c))
-
-
-def _off_by_1e_10(top: HeavyTop) -> HeavyTop:
-    a, b, c = top.inertia
-    return HeavyTop((a * (1 + Fraction(1, 10**10)), b, c), top.weight, top.centre)
-
-
-def _swapped(states: Sequence[Any]) -> list[Any]:
-    return [state[[1, 0, 2, 4, 3, 5]] for state in states]
-
-
-def _frozen(states: Sequence[Any]) -> list[Any]:
-    half = len(states) // 2
-    return [*states[:half], *[states[half]] * (len(states) - half)]
-
-
-def _not_a_number(states: Sequence[Any]) -> list[Any]:
-    return [*states[:-1], states[-1] * float("nan")]
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Fault:
     """heyoka in double, and what is wrong with it.
@@ -100,7 +74,7 @@ class Fault:
 
     about: str
     options: dict[str, Any] = field(default_factory=dict)
-    top: Callable[[HeavyTop], HeavyTop] = _as_asked
+    top: Callable[[HeavyTop], HeavyTop] = lambda top: top
     stepping: type[Stepper] = Stepper
     states: Callable[[Sequence[Any]], list[Any]] = list
     stops: Fraction = Fraction(1)
@@ -160,9 +134,16 @@ class Fault:
         return replace(run, problem=healthy, flags=compiled(HEAVY_TOP, DOUBLE).flags)
 
 
+_OFF = 1 + Fraction(1, 10**10)
 FAULTS = {
-    "sign": Fault("P γ × r enters (1.1) with the other sign", top=_pulled_upwards),
-    "coefficient": Fault("I1 is larger by 1e-10 of itself", top=_off_by_1e_10),
+    "sign": Fault(
+        "P γ × r enters (1.1) with the other sign",
+        top=lambda top: HeavyTop(top.inertia, top.weight, [-part for part in top.centre]),
+    ),
+    "coefficient": Fault(
+        "I1 is larger by 1e-10 of itself",
+        top=lambda top: HeavyTop((top.inertia[0] * _OFF, *top.inertia[1:]), top.weight, top.centre),
+    ),
     "tolerance": Fault("tolerance 1e-9", options={"tolerance": Fraction(1, 10**9)}),
     "order": Fault("one order less, at heyoka's own step", stepping=_OneOrderLess),
     "summation": Fault(
@@ -171,9 +152,15 @@ FAULTS = {
         detectable=False,
     ),
     "clock": Fault("time summed in one double", stepping=_ClockInOneWord, detectable=False),
-    "axes": Fault("axes 1 and 2 swapped in what is handed over", states=_swapped),
-    "frozen": Fault("the state stands still from the middle on", states=_frozen),
-    "nan": Fault("the last state is NaN", states=_not_a_number),
+    "axes": Fault(
+        "axes 1 and 2 swapped in what is handed over",
+        states=lambda states: [state[[1, 0, 2, 4, 3, 5]] for state in states],
+    ),
+    "frozen": Fault(
+        "the state stands still from the middle on",
+        states=lambda states: [states[min(index, len(states) // 2)] for index in range(len(states))],
+    ),
+    "nan": Fault("the last state is NaN", states=lambda states: [*states[:-1], states[-1] * math.nan]),
     "stop": Fault("stops early and says so", stops=Fraction(3, 4)),
     "silent stop": Fault("stops early and says nothing", stops=Fraction(3, 4), silent=True),
 }

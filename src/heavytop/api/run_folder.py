@@ -92,8 +92,12 @@ class PlannedRun:
         greetings = _greetings(self.tasks)
         said = {"integrators": {name: text for name, (text, _) in greetings.items()}} if greetings else {}
         report = Report(SCHEMA, self.identity, environment() | said, [])
-        tasks = [_of_version(task, greetings) for task in self.tasks] if greetings else self.tasks
-        return dataclasses.replace(self, tasks=tasks)._measure(report, progress, begun)
+        versions = {name: version for name, (_, version) in greetings.items()}
+        tasks = [
+            dataclasses.replace(task, key=task.key.of_version(versions.get(task.key.subject.name, "")))
+            for task in self.tasks
+        ]
+        return dataclasses.replace(self, tasks=tasks if greetings else self.tasks)._measure(report, progress, begun)
 
     def _measure(self, report: Report, progress: Progress, begun: Progress) -> FinishedRun:
         """Measure, with the versions of programs in the keys."""
@@ -216,12 +220,6 @@ def _greeting(command: Command) -> tuple[str, str]:
     except PeerFailed as error:
         return f"not started: {error.cause}", ""
     return said, said.partition(" ")[2]
-
-
-def _of_version(task: Task, greetings: dict[str, tuple[str, str]]) -> Task:
-    """The task with the version of its program in the key of its row."""
-    _, version = greetings.get(task.key.subject.name, ("", ""))
-    return dataclasses.replace(task, key=task.key.of_version(version))
 
 
 def is_written(name: str) -> bool:

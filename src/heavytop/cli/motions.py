@@ -11,7 +11,7 @@ from inspect import Parameter, Signature, signature
 from itertools import combinations
 from operator import or_
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Protocol, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Protocol, get_args, get_type_hints
 
 import typer
 
@@ -73,83 +73,52 @@ def farthest(times: Sequence[str]) -> Fraction:
     return max(map(exact, times), key=abs)
 
 
-Inertia = Annotated[
-    str | None,
-    typer.Option(help="Principal moments A,B,C at the fixed point; with --mass 3, 6 (11,22,33,12,13,23) or 9 numbers."),
-]
-Weight = Annotated[str | None, typer.Option(help="Weight P.")]
-Mass = Annotated[str | None, typer.Option(help="In place of --weight: the mass, of a body in any axes.")]
-Gravity = Annotated[str | None, typer.Option(help="With --mass: the acceleration of gravity, such as 9.81, or 0.")]
-About = Annotated[str | None, typer.Option(help="With --mass: what --inertia is about, 'pivot' or 'centre of mass'.")]
-Centre = Annotated[str | None, typer.Option(help="Centre of mass a,b,c.")]
-BodyFile = Annotated[
-    str | None, typer.Option("--file", metavar="FILE", help="Body of a URDF, MJCF, SDF, USD or TOML file, free axes.")
-]
-Link = Annotated[str | None, typer.Option(help="Link or body of --file, where it has several.")]
-CaseName = Annotated[str | None, typer.Option("--case", help="A case of `heavytop list` in place of body and start.")]
-Omega = Annotated[str | None, typer.Option(help="Angular velocity x,y,z at t = 0, in body axes.")]
-OmegaSpace = Annotated[str | None, typer.Option(help="Angular velocity at t = 0 in space axes; needs an attitude.")]
-Gamma = Annotated[str | None, typer.Option(help="x,y,z at t = 0: unit vector pointing vertically up, in body axes.")]
-Quaternion = Annotated[str | None, typer.Option(help="Attitude w,x,y,z at t = 0, body to space.")]
-Euler = Annotated[str | None, typer.Option(help="Attitude as ZXZ:a,b,c or another sequence; radians, or 30deg.")]
-AxisAngle = Annotated[str | None, typer.Option(help="Attitude as x,y,z:angle; radians, or 30deg.")]
-Matrix = Annotated[str | None, typer.Option(help="Attitude R row by row, 9 numbers: v_space = R v_body.")]
-Times = Annotated[str, typer.Option(help="Times t1,t2,..., increasing or decreasing from 0; the first may be 0.")]
-Rotor = Annotated[str | None, typer.Option(help="Momentum k1,k2,k3 of a rotor: the system is heavy_gyrostat.")]
-SystemName = Annotated[
-    str | None,
-    typer.Option(help="heavy_top, gyrostat or heavy_gyrostat; without it heavy_top, or heavy_gyrostat with --rotor."),
-]
-Show = Annotated[
-    str | None,
-    typer.Option(metavar="WHAT", help="Also quaternion, matrix, euler:ZXZ (any sequence), position, omega-space."),
-]
-Point = Annotated[str | None, typer.Option(help="Body point x,y,z of --show position, in place of the centre of mass.")]
-Pivot = Annotated[str | None, typer.Option(help="Place x,y,z of the fixed point in space, 0,0,0 without it.")]
-Csv = Annotated[Path | None, typer.Option(metavar="FILE", help="Write the table as CSV, which `score` reads.")]
-Latex = Annotated[
-    Path | None, typer.Option(metavar="[FILE]", help="Write it as LaTeX (siunitx, booktabs); print it without FILE.")
-]
-Bibtex = Annotated[
-    Path | None, typer.Option(metavar="[FILE]", help="Write how to cite it as BibTeX; print it without FILE.")
-]
-Normalize = Annotated[bool, typer.Option("--normalize", help="Move gamma, quaternion or matrix to length 1 first.")]
-
 _PROPAGATE_SECONDS, _REFERENCE_SECONDS = 1.0, 3.0
 """Expected of a run and of an enclosure, before anything is known of them."""
 _SLOW_BITS = 2000
 """From here on a single step takes seconds, and about 20 times as long with twice the bits."""
 
 
-class _Options(NamedTuple):
-    """The options that `propagate` and `reference` share: which motion, and what is written of it where."""
+def _given(help: str, *name: str, kind: Any = str, **more: Any) -> Any:
+    return Annotated[kind if kind is bool else kind | None, typer.Option(*name, help=help, **more)]
 
-    inertia: Inertia = None
-    weight: Weight = None
-    centre: Centre = None
-    omega: Omega = None
-    gamma: Gamma = None
-    mass: Mass = None
-    gravity: Gravity = None
-    about: About = None
-    omega_space: OmegaSpace = None
-    quaternion: Quaternion = None
-    euler: Euler = None
-    matrix: Matrix = None
-    axis_angle: AxisAngle = None
-    rotor: Rotor = None
-    file: BodyFile = None
-    link: Link = None
-    case: CaseName = None
-    system: SystemName = None
-    normalize: Normalize = False
-    show: Show = None
-    point: Point = None
-    pivot: Pivot = None
-    csv: Csv = None
-    latex: Latex = None
-    bibtex: Bibtex = None
-    json: Json = False
+
+_TIMES = Annotated[str, typer.Option(help="Times t1,t2,..., increasing or decreasing from 0; the first may be 0.")]
+_DATA = {
+    "inertia": _given("Principal moments A,B,C at the fixed point; with --mass 3, 6 (11,22,33,12,13,23) or 9 numbers."),
+    "weight": _given("Weight P."),
+    "centre": _given("Centre of mass a,b,c."),
+    "omega": _given("Angular velocity x,y,z at t = 0, in body axes."),
+    "gamma": _given("x,y,z at t = 0: unit vector pointing vertically up, in body axes."),
+    "mass": _given("In place of --weight: the mass, of a body in any axes."),
+    "gravity": _given("With --mass: the acceleration of gravity, such as 9.81, or 0."),
+    "about": _given("With --mass: what --inertia is about, 'pivot' or 'centre of mass'."),
+    "omega_space": _given("Angular velocity at t = 0 in space axes; needs an attitude."),
+    "quaternion": _given("Attitude w,x,y,z at t = 0, body to space."),
+    "euler": _given("Attitude as ZXZ:a,b,c or another sequence; radians, or 30deg."),
+    "matrix": _given("Attitude R row by row, 9 numbers: v_space = R v_body."),
+    "axis_angle": _given("Attitude as x,y,z:angle; radians, or 30deg."),
+    "rotor": _given("Momentum k1,k2,k3 of a rotor: the system is heavy_gyrostat."),
+    "file": _given("Body of a URDF, MJCF, SDF, USD or TOML file, free axes.", "--file", metavar="FILE"),
+    "link": _given("Link or body of --file, where it has several."),
+}
+"""Options of body and start, by the keys of a plan."""
+_WHICH = _DATA | {
+    "case": _given("A case of `heavytop list` in place of body and start.", "--case"),
+    "system": _given("heavy_top, gyrostat or heavy_gyrostat; without it heavy_top, or heavy_gyrostat with --rotor."),
+    "normalize": _given("Move gamma, quaternion or matrix to length 1 first.", "--normalize", kind=bool),
+}
+_WHERE = {
+    "show": _given("Also quaternion, matrix, euler:ZXZ (any sequence), position, omega-space.", metavar="WHAT"),
+    "point": _given("Body point x,y,z of --show position, in place of the centre of mass."),
+    "pivot": _given("Place x,y,z of the fixed point in space, 0,0,0 without it."),
+    "csv": _given("Write the table as CSV, which `score` reads.", kind=Path, metavar="FILE"),
+    "latex": _given("Write it as LaTeX (siunitx, booktabs); print it without FILE.", kind=Path, metavar="[FILE]"),
+    "bibtex": _given("Write how to cite it as BibTeX; print it without FILE.", kind=Path, metavar="[FILE]"),
+    "json": Json,
+}
+_SHARED = _WHICH | _WHERE
+"""The options that `propagate` and `reference` share: which motion, and what is written of it where."""
 
 
 class MotionOptions(Protocol):
@@ -165,21 +134,19 @@ class MotionOptions(Protocol):
 
 
 _FURTHER: list[Any] = [feature.load(feature.motion) for feature in FEATURES if feature.motion]
-_SHARED = list(_Options._fields)
-_DATA = _SHARED[: _SHARED.index("case")]
-"""Options of body and start, by the keys of a plan."""
 
 
 class _Asked:
     """A request, read before anything is computed; raises InputError for what cannot be read."""
 
-    def __init__(self, times: str, options: _Options, further: list[MotionOptions]) -> None:
-        self.files = {name: getattr(options, name) for name in _AS}
-        require_one_output(self.files, options.json)
-        options_of_data = {name: getattr(options, name) for name in _DATA}
-        self.options = options
-        self.top, self.start, self.system = _motion(options_of_data, options.case, options.system, options.normalize)
-        self.outputs, self.times = _outputs(options.show, options.point, options.pivot), numbers(times)
+    def __init__(self, times: str, options: dict[str, Any], further: list[MotionOptions]) -> None:
+        self.files = {name: options[name] for name in _AS}
+        self.case, self.json = options["case"], options["json"]
+        require_one_output(self.files, self.json)
+        data = {name: options[name] for name in _DATA}
+        self.top, self.start, self.system = _motion(data, self.case, options["system"], options["normalize"])
+        self.outputs = _outputs(options["show"], options["point"], options["pivot"])
+        self.times = numbers(times)
         self.further = [(option, what) for option in further if (what := option.require())]
 
     def beside(self, expected: float, **settings: Any) -> list[Any]:
@@ -206,9 +173,9 @@ class _Asked:
 
         Raises InputError for a file that cannot be written.
         """
-        options, on_screen = self.options, None
-        only_json = options.json and not any(self.files.values())
-        table = None if only_json else make_table().of_case(options.case)
+        on_screen = None
+        only_json = self.json and not any(self.files.values())
+        table = None if only_json else make_table().of_case(self.case)
         for make, path in self.files.items():
             if path is None or table is None:
                 continue
@@ -219,7 +186,7 @@ class _Asked:
                 with writing():
                     replace(path, content.encode())
                 say(f"wrote {path}")
-        if options.json:
+        if self.json:
             command, version = made_by()
             whole = reduce(or_, (extra.to_json() for extra in beside), document())
             print_json({**whole, "command": command, "version": version})
@@ -237,28 +204,28 @@ def _of_a_motion(function: Callable[..., int]) -> Callable[..., int]:
     here, the 25 shared options would stand in both commands.
     """
 
-    names = {name: name for name in (*_SHARED, *signature(function).parameters)} | {"step_limit": "max_steps"}
-    named = {name: f"--{option.replace('_', '-')}" for name, option in names.items()}
+    names = (*_SHARED, *signature(function).parameters)
+    named = {name: f"--{name.replace('_', '-')}" for name in names} | {"step_limit": "--max-steps"}
 
     @wraps(function)
     @options_named(named)
     def with_options(times: str, **options: Any) -> int:
-        shared = _Options(**{name: options.pop(name) for name in _SHARED})
+        shared = {name: options.pop(name) for name in _SHARED}
         further = [kind(**{name: options.pop(name) for name in kind._fields}) for kind in _FURTHER]
         return function(_Asked(times, shared, further), **options)
 
-    sources = (function, _Options, *_FURTHER)
-    hints = {name: hint for source in sources for name, hint in get_type_hints(source, include_extras=True).items()}
-    parameters = {
-        parameter.name: parameter.replace(kind=Parameter.KEYWORD_ONLY, annotation=hints[parameter.name])
-        for source in sources
-        for parameter in signature(source).parameters.values()
-    }
-    own = [name for name in signature(function).parameters if name != "asked"]
-    own += [name for kind in _FURTHER for name in kind._fields]
-    which, where = _SHARED[: _SHARED.index("show")], _SHARED[_SHARED.index("show") :]
-    times = Parameter("times", Parameter.KEYWORD_ONLY, annotation=Times)
-    vars(with_options)["__signature__"] = Signature([times, *(parameters[name] for name in (*which, *own, *where))])
+    def parameter(name: str, hint: Any, default: Any = Parameter.empty) -> Parameter:
+        return Parameter(name, Parameter.KEYWORD_ONLY, annotation=hint, default=default)
+
+    def shared(options: dict[str, Any]) -> list[Parameter]:
+        return [parameter(name, hint, False if get_args(hint)[0] is bool else None) for name, hint in options.items()]
+
+    middle = []
+    for source in (function, *_FURTHER):
+        hints, parts = get_type_hints(source, include_extras=True), signature(source).parameters
+        middle += [parameter(name, hints[name], part.default) for name, part in parts.items() if name != "asked"]
+    parameters = [parameter("times", _TIMES), *shared(_WHICH), *middle, *shared(_WHERE)]
+    vars(with_options)["__signature__"] = Signature(parameters)
     return with_options
 
 

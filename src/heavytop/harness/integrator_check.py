@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from math import ceil, log
 from typing import Any, Literal, NamedTuple
 
@@ -28,7 +28,6 @@ from heavytop.precision import DOUBLE, Precision, Vector, decimal_text, exact, p
 from heavytop.processes import GuardedProcess
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
-from heavytop.top.equations import system as system_named
 from heavytop.top.heavy_top import HeavyTop, State
 
 _PATIENCE = 60
@@ -47,6 +46,7 @@ _REPRESENTED = 16
 """eps by which a start may be off that was held as a quaternion, say."""
 _HUGE = 10**150
 _HUGE_REQUEST = "At |Ω| = 1e150, t = 1"
+_MANY = [Fraction(i, 500) for i in range(1, 1001)]
 _BETWEEN = [Fraction(2 * i, 41) for i in range(1, 42)]
 """Times that no step is likely to end at by itself."""
 _SETTINGS = {"tolerance": (Fraction(1, 10**6), Fraction(1, 10**9)), "step": (Fraction(1, 10), Fraction(1, 20))}
@@ -185,10 +185,10 @@ class _Contract:
         """The name of each part, and what tries it."""
         parts: list[tuple[str, Callable[[], str]]] = [
             ("start", self._starts),
-            ("one time", self._one_time),
+            ("one time", partial(self._plain, "At t = 1 it")),
             ("times [0]", self._start_alone),
             ("times [0, 1]", self._start_and_one),
-            ("many times", self._many),
+            ("many times", partial(self._plain, "At 1000 times up to t = 2 it", _MANY)),
             ("digits", self._digits),
             ("determinism", self._same_twice),
             ("restart", self._restart),
@@ -197,13 +197,17 @@ class _Contract:
             ("steps", self._steps),
             ("between steps", self._between_steps),
             ("attitude", self._attitude),
-            *((f"format {precision.name}", self._format(precision)) for precision in self.precisions[1:]),
-            *((f"system {name}", self._of_system(name)) for name in self.systems[1:]),
+            *((f"format {p.name}", partial(self._plain, f"In {p.name} it", precision=p)) for p in self.precisions[1:]),
+            *(
+                (f"system {name}", partial(self._plain, f"As a {name} it", case=CASES[_case(name)]))
+                for name in self.systems[1:]
+            ),
         ]
         if self.program:
             parts += [("unknown lines", self._unknown_lines), ("two processes", self._two_at_once)]
         parts.append((_TOO_FAST, self._huge))
-        return parts + ([("quit", self._quit), ("end of input", self._end_of_input)] if self.program else [])
+        ends = {"quit": (b"quit\n", "quit"), "end of input": (b"", "the end of its input")} if self.program else {}
+        return parts + [(name, partial(self._ended_by, *how)) for name, how in ends.items()]
 
     def _run(
         self,
@@ -232,8 +236,10 @@ class _Contract:
             raise _Note(f"It says ready {greeting}".rstrip() + " without a version: ready NAME VERSION.")
         return f"It says that it is {greeting}."
 
-    def _one_time(self) -> str:
-        return self._right(self._run([1]), "At t = 1 it")
+    def _plain(self, subject: str, times: Sequence[int | Fraction] = (1,), case: Any = None, **more: Any) -> str:
+        """Whether a run of a case is right."""
+        about = {} if case is None else {"start": case.start, "top": case.top, "system": case.system}
+        return self._right(self._run(times, **about, **more), subject, case)
 
     def _start_alone(self) -> str:
         try:
@@ -248,9 +254,6 @@ class _Contract:
         run = self._run([0, 1])
         self._off_start(run.states[0])
         return self._right(run, "Asked for t = 0 and 1 it")
-
-    def _many(self) -> str:
-        return self._right(self._run([Fraction(i, 500) for i in range(1, 1001)]), "At 1000 times up to t = 2 it")
 
     def _digits(self) -> str:
         values = [exact(value) for state in self._run([1, 2, 3]).states for value in state]
@@ -372,15 +375,6 @@ class _Contract:
         many, *alone = runs
         return _Between(self._error(many), max(map(self._error, alone)), alone[-1].steps, many.order)
 
-    def _format(self, precision: Precision) -> Callable[[], str]:
-        return lambda: self._right(self._run([1], precision=precision), f"In {precision.name} it")
-
-    def _of_system(self, name: str) -> Callable[[], str]:
-        case = CASES[_case(name)]
-        return lambda: self._right(
-            self._run([1], case.start, case.top, system=system_named(name)), f"As a {name} it", case
-        )
-
     def _attitude(self) -> str:
         if not described(self.which).carries_attitude:
             return (
@@ -452,12 +446,6 @@ class _Contract:
             reply = program.ask(command.request(problem, [time], self._default()), seconds)
         if reply.failure:
             raise PeerFailed(f"{command.name} failed: {reply.failure}", answered=True)
-
-    def _quit(self) -> str:
-        return self._ended_by(b"quit\n", "quit")
-
-    def _end_of_input(self) -> str:
-        return self._ended_by(b"", "the end of its input")
 
     def _ended_by(self, text: bytes, what: str) -> str:
         assert self.program is not None

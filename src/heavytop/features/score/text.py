@@ -42,7 +42,7 @@ from heavytop.report.document.document import (
     short,
 )
 from heavytop.report.document.svg import COLOURS, decades, finish, new_axes, spoken
-from heavytop.report.render.text import table, wrapped
+from heavytop.report.render.text import Lines, wrapped
 
 # Mistakes of convention in a sentence each: what fits, where it was found, and how many digits are right with it.
 
@@ -436,7 +436,7 @@ def sizes(row: Row) -> list[list[Cell]]:
 def score_text(assessment: Assessment) -> RenderableType:
     """Digits right, distance from the known motion, drift of every first integral, what explains the error."""
     row = assessment.row
-    numbers = table(["", f"largest over {row.samples} samples", "rms", "final"], sizes(row))
+    numbers = Lines(["", f"largest over {row.samples} samples", "rms", "final"], sizes(row))
     about = f"{row.case}: {row.integrator}, {row.system.replace('_', ' ')} in {row.precision} ({row.bits} bits)"
     parts: list[RenderableType] = [Text(line) for line in answer(row, assessment.peer)]
     parts += [Text(), numbers, Text(), *_wrapped(about), *_wrapped(f"Reference: {row.reference.brief}.")]

@@ -14,7 +14,7 @@ from heavytop.report.compare.rows import Finding
 from heavytop.report.compare.verdicts import Verdict
 from heavytop.report.document.document import clip, row_name, short
 from heavytop.report.document.motions import WorseMotions
-from heavytop.report.render.text import table, wrapped
+from heavytop.report.render.text import Lines, wrapped
 
 _MOST = 200
 """Rows listed, and metrics of the table of all: more scroll away."""
@@ -72,7 +72,7 @@ def _motions(motions: WorseMotions) -> Iterator[RenderableType]:
 
 def _metrics(result: Differences) -> Iterator[RenderableType]:
     columns = ("verdict", "row", "metric", "baseline", "candidate", "why")
-    yield table(columns, map(_cells, result.changed[:_MOST]), words=6)
+    yield Lines(columns, list(map(_cells, result.changed[:_MOST])), words=6)
     if len(result.changed) > _MOST:
         yield Text(f" and {len(result.changed) - _MOST} more: --json lists all, --html FILE draws them")
 

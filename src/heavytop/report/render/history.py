@@ -19,7 +19,7 @@ from heavytop.report.compare.verdicts import Verdict
 from heavytop.report.document.document import Key, Section, clip, draw, logarithm, numbered, row_name, scientific, short
 from heavytop.report.document.kind import Kinds
 from heavytop.report.document.svg import COLOURS, End, Picture, decades, finish, new_axes, quiet_style, room, spoken
-from heavytop.report.render.text import table
+from heavytop.report.render.text import Lines
 from heavytop.report.store.checks import law_text
 from heavytop.report.store.store import AnyReport
 
@@ -103,7 +103,7 @@ def history_text(names: Sequence[str], tracks: Sequence[Track]) -> RenderableTyp
             Text("\nNothing changed, or nothing matches. --metric '*' shows what did not change too.", style="bold"),
         )
     numbers = [str(number) for number in range(1, len(names) + 1)]
-    shown = table(["row", "metric", *numbers], map(cells, tracks), words=2)
+    shown = Lines(["row", "metric", *numbers], list(map(cells, tracks)), words=2)
     return Group(*heads, Text(_LEGEND, style="dim"), Text(), shown)
 
 

@@ -70,6 +70,11 @@ def report_page(report: Report, kinds: Kinds) -> str:
     blocks_by_kind = document(report, kinds, In.PAGE)
     blocks = [block for blocks in blocks_by_kind.values() for block in blocks]
     not_finite = [row for row in report.rows if row.outcome == "success" and not row.finite]
+    # of some kinds a finding about the integrator, in its chart
+    aborted = (row for row in report.rows if row.outcome not in ("success", *UNMEASURED))
+    groups: dict[str, list[Row]] = {}
+    for row in rows:
+        groups.setdefault(row.key.kind or "other", []).append(row)
     return render(
         "report.html.j2",
         report=report,
@@ -82,11 +87,11 @@ def report_page(report: Report, kinds: Kinds) -> str:
         failed=len(failures),
         not_supported=unsupported(report.rows),
         lacking=sum(row.outcome == UNSUPPORTED for row in report.rows),
-        gave_up=Counter(kind_of(row, kinds).may_end_early for row in report.rows if _gave_up(row, kinds)),
+        gave_up=Counter(filter(None, (kind_of(row, kinds).may_end_early for row in aborted))),
         not_finite=not_finite,
         overflowed=all(kind_of(row, kinds).may_overflow for row in not_finite),
         sections=sections([("", report)], kinds),
-        groups=_by_kind(rows),
+        groups=groups,
         kinds=kinds,
         left_out=left_out,
         environment=report.environment,
@@ -103,11 +108,6 @@ def _failure(row: Row) -> list[Cell]:
     names = (row.case, row.measure.replace("_", " "), row.integrator, row.precision)
     reached = (Word(clip(row.outcome, 30)), short(row.time_reached), short(row.horizon), str(row.steps or "-"))
     return [*map(clip, names), *reached, "" if row.metrics else clip(row.against, 200)]
-
-
-def _gave_up(row: Row, kinds: Kinds) -> bool:
-    """Whether a run ended early that may: a finding about its integrator, in its chart."""
-    return bool(kind_of(row, kinds).may_end_early) and row.outcome not in ("success", *UNMEASURED)
 
 
 def comparison_page(baseline: Report, candidate: Report, comparison: Differences, kinds: Kinds) -> str:
@@ -168,20 +168,13 @@ def _add(tables: dict[str, Section], table: Table, source: str) -> None:
 
 def detailed(rows: Sequence[Row]) -> tuple[list[Row], int]:
     """The rows shown one by one, the first and the worst of the others, and how many are left out."""
-    rest = sorted(rows[MOST_ROWS:], key=_badness)[:MOST_WORST]
+
+    def goodness(row: Row) -> tuple[bool, bool, float]:
+        kept = digits_kept(row)
+        return row.outcome == "success", row.finite, math.inf if kept is None else kept
+
+    rest = sorted(rows[MOST_ROWS:], key=goodness)[:MOST_WORST]
     return [*rows[:MOST_ROWS], *rest], max(0, len(rows) - MOST_ROWS - len(rest))
-
-
-def _by_kind(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    rows_of_kind: dict[str, list[Row]] = {}
-    for row in rows:
-        rows_of_kind.setdefault(row.key.kind or "other", []).append(row)
-    return rows_of_kind
-
-
-def _badness(row: Row) -> tuple[bool, bool, float]:
-    kept = digits_kept(row)
-    return row.outcome == "success", row.finite, float("inf") if kept is None else kept
 
 
 def main_metric(row: Row, kinds: Kinds) -> str:

@@ -165,11 +165,6 @@ def wrapped(text: str, indent: str = "  ", first: str = "", width: int = 80) -> 
 _WHOLE_WORDS: Any = {"break_long_words": False, "break_on_hyphens": False}
 
 
-def table(columns: Sequence[str], rows: Iterable[Sequence[Cell | Text]], words: int = 1, left: bool = False) -> Lines:
-    """A table without lines; its first ``words`` columns are words, the others are numbers; ``left``: not the last."""
-    return Lines(columns, list(rows), words, left)
-
-
 def both(lines: Iterable[tuple[Row, Sequence[Cell]]]) -> list[list[Cell]]:
     """The cells of each row behind its case; what is the same forward and backward once, and then without direction."""
     groups: dict[tuple[str, ...], tuple[list[Row], Sequence[Cell]]] = {}
@@ -249,7 +244,7 @@ def worst(report: AnyReport, rows: Iterable[Row], hint: str) -> RenderableType:
         if group in tally.fewest:
             kept, case = tally.fewest[group]
             lines.append(["digits right, fewest", digits_text(kept), case, ""])
-        parts.append(table(["metric", "largest", "in", "not available"], lines))
+        parts.append(Lines(["metric", "largest", "in", "not available"], lines))
     return Group(*parts, Text(), Text(hint))
 
 
