@@ -72,6 +72,9 @@ _MAX_ATOMS = 10
 _MAX_PRODUCTS = 150
 _MAX_DEGREE_OF_PRODUCTS = 4
 _PROGRAMS = 30
+_MOST_FACTORED = 10_000
+_factors: dict[str, Any] = {}
+"""Of polynomials by their texts: all rings name their generators alike, in one context of FLINT."""
 
 
 class Signs:
@@ -88,7 +91,6 @@ class Signs:
         self._facts: list[tuple[fmpq_mpoly, Sign]] = []
         self._products: list[tuple[fmpq_mpoly, Sign]] = []
         self._known: dict[str, tuple[Sign, int]] = {}
-        self._factors: dict[str, Any] = {}
         self._left = _BUDGET
         self._depth = 0
         self._programs = _PROGRAMS
@@ -159,11 +161,13 @@ class Signs:
         return list({str(p): p for p in nonzero}.values())
 
     def factors(self, p: fmpq_mpoly) -> Any:
-        """(constant, [(factor, power)]), made once."""
+        """(constant, [(factor, power)]), made once for all rings."""
         key = str(p)
-        if key not in self._factors:
-            self._factors[key] = p.factor()
-        return self._factors[key]
+        if key not in _factors:
+            if len(_factors) == _MOST_FACTORED:
+                _factors.clear()
+            _factors[key] = p.factor()
+        return _factors[key]
 
     def of(self, p: fmpq_mpoly) -> Sign:
         """The sign of ``p``: the product of those of its factors."""
