@@ -4,14 +4,16 @@ from fractions import Fraction
 
 import numpy
 import pytest
+from flint import arb
 
+from heavytop.cases import case
 from heavytop.exact.cases.delone import DeloneHomoclinic
 from heavytop.exact.flint.balls import ball, working_precision
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.scalar import metric, of_fraction, root, text, to_ball
-from heavytop.measure.scorer import Drift, SolutionError, split
-from heavytop.measure.truth import Truth
+from heavytop.measure.scorer import Drift, Rough, Scorer, SolutionError, split
+from heavytop.measure.truth import Truth, closed_form
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, exact, number, real
 from heavytop.records import Against
 from heavytop.top.equations import holding
@@ -19,6 +21,7 @@ from heavytop.top.heavy_top import HeavyTop, State
 
 TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
 START = State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5"))
+START_DOUBLES = tuple(map(float, START.flat))
 
 
 @pytest.mark.slow
@@ -150,3 +153,73 @@ def test_native_numbers_become_exact_balls(precision) -> None:
             assert to_ball(native).is_exact()
             assert to_ball(native) == ball(exact(native))
         assert not to_ball(number(Fraction(1), precision) * float("inf")).is_finite()
+
+
+@pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, QUAD], ids=lambda p: p.name)
+@pytest.mark.parametrize("name", ["euler", "lagrange", "gyrostat"])
+def test_samples_at_once_and_one_by_one_give_the_same_text(name: str, precision) -> None:
+    known = case(name)
+    problem = Problem.of(known.top, known.start, precision, known.system)
+    truth = Truth(Against("proven"), closed_form(problem).state)
+    times = [Fraction(time) for time in range(1, 81)]
+    options = {"threshold": 40 * precision.eps, "until": 60.0}
+    scorers = [Scorer(problem, truth, times[9::20], **options) for _ in range(2)]
+    for scorer in scorers:
+        propagate(known.top, known.start, times, precision, system=known.system, observer=scorer)
+    one, two = scorers
+    two.one_by_one()
+    assert one.metrics() == two.metrics()
+    assert one.series(str) == two.series(str)
+    assert one.error.escape == two.error.escape
+    assert one.summarised
+    assert not two.summarised
+    one(Fraction(81), problem.start.flat)
+    two(Fraction(81), problem.start.flat)
+    assert one.metrics() == two.metrics()
+    assert one.content() == two.content()
+
+
+def test_a_state_that_is_not_finite_and_a_digit_that_stays_open_are_taken_one_by_one() -> None:
+    problem = Problem.of(TOP, START, DOUBLE)
+    for value in (float("nan"), 0.5):
+        wide = Truth(
+            Against("computed"), lambda time, bits: [to_ball(x).union(to_ball(x + 0.001)) for x in START_DOUBLES]
+        )
+        scorer = Scorer(problem, wide)
+        for time in range(1, 41):
+            scorer(Fraction(time), numpy.array([*START_DOUBLES[:5], value]))
+        assert (scorer.metrics()["drift_energy_max"].value == "nan") == (value != value)
+        assert not scorer.summarised
+
+
+def test_bounds_of_rough_numbers_hold_the_exact_ones() -> None:
+    generator = numpy.random.default_rng(5)
+    mantissas, exponents = generator.uniform(-1, 1, (2, 300)), generator.integers(-40, 3, (2, 300))
+    radii = generator.uniform(0, 1, (2, 300)) * 2.0 ** (exponents - generator.integers(5, 60, (2, 300)))
+    middles = mantissas * 2.0**exponents
+    middles[1, ::3] = middles[0, ::3] * (1 + 2.0**-45)
+    ends = generator.choice([-1, 1], (2, 300))
+    with working_precision(300):
+        balls = [
+            [arb(float(m), float(r)) for m, r in zip(*row, strict=True)] for row in zip(middles.T, radii.T, strict=True)
+        ]
+    rough = Rough.of(balls)
+    true = [
+        [Fraction(m) + int(e) * Fraction(r) for m, e, r in zip(*row, strict=True)]
+        for row in zip(middles, ends, radii, strict=True)
+    ]
+    for rule in (
+        lambda a, b: a + b,
+        lambda a, b: a - b,
+        lambda a, b: a * b,
+        lambda a, b: a / b,
+        lambda a, b: (a - b) * (a + b),
+    ):
+        with numpy.errstate(all="ignore"):
+            found = rule(rough[0], rough[1])
+        assert numpy.isfinite(found.error).mean() > 0.9
+        for value, error, a, b in zip(found.value, found.error, *true, strict=True):
+            assert error == float("inf") or abs(Fraction(value) - rule(a, b)) <= Fraction(error)
+    narrow = Rough.of([[to_ball(3.0), to_ball(7.0)]])
+    assert float((narrow[0] / narrow[1]).error[0]) < 2.0**-51
+    assert Rough.of([[to_ball(0.0)]])[0].squared().error[0] == 0

@@ -70,6 +70,14 @@ def resolved(value: arb) -> bool:
     return bool(value.is_finite()) and abs(midpoint(value)) >= RESOLVED_RADII * radius(value)
 
 
+def decided(value: arb) -> bool:
+    """Whether :func:`text` is the same of all numbers in a ball."""
+    if not resolved(value):
+        return False
+    middle, wide = midpoint(value), radius(value)
+    return decimal_text(middle - wide, DIGITS) == decimal_text(middle + wide, DIGITS)
+
+
 def text(value: arb, digits: int = DIGITS) -> str:
     """A ball as report text: decimal, ``nan`` or ``unresolved``."""
     if not value.is_finite():

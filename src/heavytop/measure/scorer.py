@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cache, reduce
 from typing import TYPE_CHECKING, Any
 
+import numpy
 from flint import arb
+from numpy.typing import NDArray
 
 from heavytop.exact.flint.balls import (
     ball,
@@ -21,7 +24,18 @@ from heavytop.exact.flint.balls import (
     working_precision,
 )
 from heavytop.integrate.trajectory import Problem
-from heavytop.measure.scalar import GUARD_BITS, larger, largest, metric, relative_error, resolved, root, text, to_balls
+from heavytop.measure.scalar import (
+    GUARD_BITS,
+    decided,
+    larger,
+    largest,
+    metric,
+    relative_error,
+    resolved,
+    root,
+    text,
+    to_balls,
+)
 from heavytop.precision import dot, log10
 from heavytop.records import Against, Metric, Quantity, Series, by_name
 from heavytop.top.equations import Integral, Parameters
@@ -179,12 +193,13 @@ class Drift(Statistics):
         with working_precision(self.bits):
             return self.sums(to_balls(state))
 
+    def values(self, y: Sequence[arb]) -> list[arb]:
+        """The drifts of a state of balls, at a working precision of ``bits``."""
+        return [value(self.parameters, y) - self.initial[name] for name, value in self.functions.items()]
+
     def sums(self, y: Sequence[arb]) -> list[Sums]:
         """The sums of the drifts with a state of balls, at a working precision of ``bits``."""
-        return [
-            self.running[name].following(value(self.parameters, y) - self.initial[name])
-            for name, value in self.functions.items()
-        ]
+        return [running.following(drift) for running, drift in zip(self.running.values(), self.values(y), strict=True)]
 
     def quantities(self) -> dict[Quantity, Running]:
         """The running values by what they are of."""
@@ -256,9 +271,8 @@ class SolutionError(Statistics):
             return
         sums, left = errors
         keep = bool(self.keep) and time in self.keep
-        counts = math.isinf(self.until) or abs(float(time)) <= self.until
         for running, part in zip(self.running.values(), sums, strict=True):
-            (running.take if counts else running.remember)(time, part, keep)
+            (running.take if self.counts(time) else running.remember)(time, part, keep)
         if left and self.escape is None:
             self.escape = time
 
@@ -279,12 +293,23 @@ class SolutionError(Statistics):
 
     def errors(self, y: Sequence[arb], truth: Sequence[arb]) -> Errors:
         """:meth:`following` of a state of six balls, at a working precision of ``bits``."""
+        values = self.values(y, truth)
+        sums = [running.following(value) for running, value in zip(self.running.values(), values, strict=True)]
+        return sums, self.left(values[0])
+
+    def values(self, y: Sequence[arb], truth: Sequence[arb]) -> list[arb]:
+        """The errors of a state of six balls by :data:`COMPONENTS`, and relative, at the working precision."""
         delta = [value - true for value, true in zip(y, truth, strict=True)]
         flow = self.system.field(self.parameters, truth)
-        omega = largest(delta[:3])
-        values = omega, largest(delta[3:]), *split(delta, flow), relative_error(delta, truth)
-        sums = [running.following(value) for running, value in zip(self.running.values(), values, strict=True)]
-        return sums, self.threshold is not None and bool(omega > rational(self.threshold))
+        return [largest(delta[:3]), largest(delta[3:]), *split(delta, flow), relative_error(delta, truth)]
+
+    def left(self, omega: arb) -> bool:
+        """Whether an error of Ω is beyond the threshold."""
+        return self.threshold is not None and bool(omega > rational(self.threshold))
+
+    def counts(self, time: Fraction) -> bool:
+        """Whether the errors at that time count."""
+        return math.isinf(self.until) or abs(float(time)) <= self.until
 
     @whole_evaluation
     def last(self, rate: Fraction) -> float:
@@ -374,26 +399,64 @@ class Scorer(DriftAndError):
         until: float = math.inf,
         name: str = SOLUTION_ERROR,
     ) -> None:
-        self.drift: Drift = Drift(problem, problem.integrals(), keep)
-        self.truth = truth
-        self.error: SolutionError | None = None
+        self._drift = Drift(problem, problem.integrals(), keep)
+        self.truth, self.keep, self.system = truth, self._drift.keep, problem.system
+        self._error: SolutionError | None = None
         if not isinstance(truth, str):
-            self.error = SolutionError(problem, truth, keep, threshold, until, name)
+            self._error = SolutionError(problem, truth, keep, threshold, until, name)
+        self._waiting: list[tuple[Fraction, Any]] | None = []
+        self.summarised = False
+
+    @property
+    def drift(self) -> Drift:  # type: ignore[override]
+        """Of all samples so far."""
+        summarise([self])
+        return self._drift
+
+    @property
+    def error(self) -> SolutionError | None:  # type: ignore[override]
+        """Of all samples so far; None without a reference."""
+        summarise([self])
+        return self._error
+
+    @property
+    def waits(self) -> int:
+        """How many samples are not in the running values."""
+        return 0 if self.summarised else len(self._waiting or ())
 
     def __call__(self, time: Fraction, state: Sequence[Any]) -> None:
         """Take in one native state."""
+        if self._waiting is not None and not self.summarised and len(self._waiting) < _MOST_AT_ONCE:
+            self._waiting.append((time, state.copy() if isinstance(state, numpy.ndarray) else tuple(state)))
+        else:
+            self.one_by_one()
+            self._take(time, state)
+
+    def one_by_one(self) -> None:
+        """Take in the samples that wait one after the other, and all that follow at once."""
+        if self._waiting is None:
+            return
+        waiting, self._waiting, self.summarised = self._waiting, None, False
+        self._drift.running = {name: Running() for name in self._drift.running}
+        if self._error is not None:
+            self._error.running = {name: Running() for name in self._error.running}
+            self._error.escape = None
+        for time, state in waiting:
+            self._take(time, state)
+
+    def _take(self, time: Fraction, state: Sequence[Any]) -> None:
         drifts, errors = self._following(time, state)
-        self.drift.take(time, drifts)
-        if self.error is not None:
-            self.error.take(time, errors)
+        self._drift.take(time, drifts)
+        if self._error is not None:
+            self._error.take(time, errors)
 
     @whole_evaluation
     def _following(self, time: Fraction, state: Sequence[Any]) -> tuple[list[Sums], Errors | None]:
-        error = self.error
+        error = self._error
         truth = None if error is None else error.known(time)
-        with working_precision(self.drift.bits):
+        with working_precision(self._drift.bits):
             y = to_balls(state)  # once for both
-            return self.drift.sums(y), None if error is None or truth is None else error.errors(y[:6], truth)
+            return self._drift.sums(y), None if error is None or truth is None else error.errors(y[:6], truth)
 
     def take(self, times: Iterable[Fraction], states: Iterable[Sequence[Any]]) -> None:
         """Take in an array of native states, one at each of the exact times."""
@@ -402,13 +465,207 @@ class Scorer(DriftAndError):
 
     def content(self) -> dict[str, Any]:
         """The sums so far, as plain text and integers, exact."""
-        return {"drift": self.drift.content()} | ({"error": self.error.content()} if self.error else {})
+        self.one_by_one()
+        return {"drift": self._drift.content()} | ({"error": self._error.content()} if self._error else {})
 
     def restore(self, content: dict[str, Any]) -> None:
         """Go on from that :meth:`content`."""
-        self.drift.restore(content["drift"])
-        if self.error is not None:
-            self.error.restore(content["error"])
+        self.one_by_one()
+        self._drift.restore(content["drift"])
+        if self._error is not None:
+            self._error.restore(content["error"])
+
+
+# Many samples at once.
+#
+# The drifts of a sample and its distance from the truth are balls.  What follows from them is worked out for all
+# samples in doubles with proven errors: these tell which few samples may be the largest, of which the balls are
+# evaluated, and what the squares add up to.  Where that leaves a digit of a report open, all are taken one by one.
+
+
+_FEW, _MOST_AT_ONCE = 24, 4096
+_ROUNDING, _ROOM, _UNDERFLOW = 2.0**-52, 1 + 2.0**-48, 1e-300
+
+
+@dataclass(frozen=True, slots=True)
+class Rough:
+    """Arrays of doubles, and bounds of their errors: a ring, so that the fields are evaluated for many states.
+
+    Each bound has room for the rounding of its own evaluation, and for underflow.
+    """
+
+    value: NDArray[numpy.float64]
+    error: NDArray[numpy.float64]
+
+    @classmethod
+    def of(cls, balls: Sequence[Sequence[arb]]) -> Rough:
+        """Of rows of balls, a column each: exact where a ball is 0."""
+        value = numpy.array([[float(ball) for ball in row] for row in balls])
+        radii = numpy.array([[float(ball.rad()) for ball in row] for row in balls])
+        exact = (value == 0) & (radii == 0)
+        for row, column in zip(*numpy.nonzero(exact), strict=True):
+            exact[row, column] = balls[row][column].is_zero()
+        return _rounded(value.T, radii.T, numpy.where(exact.T, 0.0, _UNDERFLOW))
+
+    def __getitem__(self, where: Any) -> Rough:
+        return Rough(self.value[where], self.error[where])
+
+    def __neg__(self) -> Rough:
+        return Rough(-self.value, self.error)
+
+    def __add__(self, other: Rough) -> Rough:
+        return _rounded(self.value + other.value, self.error + other.error)
+
+    def __sub__(self, other: Rough) -> Rough:
+        return _rounded(self.value - other.value, self.error + other.error)
+
+    def __mul__(self, other: Rough) -> Rough:
+        one, two = abs(self.value) + self.error, abs(other.value)
+        return _rounded(self.value * other.value, one * other.error + two * self.error)
+
+    def __truediv__(self, other: Rough) -> Rough:
+        ratio, least = self.value / other.value, abs(other.value) - other.error * _ROOM
+        error = (self.error + abs(ratio) * other.error) / numpy.where(least > 0, least, 0.0)
+        return _rounded(ratio, error)
+
+    def squared(self) -> Rough:
+        """The squares: exactly 0 of exactly 0."""
+        square = self * self
+        return Rough(square.value, numpy.where((self.value == 0) & (self.error == 0), 0.0, square.error))
+
+
+def _rounded(value: Any, error: Any, underflow: Any = _UNDERFLOW) -> Rough:
+    return Rough(value, (error + (_ROUNDING * abs(value) + underflow)) * _ROOM)
+
+
+def _most(parts: Sequence[Rough]) -> Rough:
+    return Rough(reduce(numpy.maximum, (p.value for p in parts)), reduce(numpy.maximum, (p.error for p in parts)))
+
+
+def _sum(parts: Iterable[Rough]) -> Rough:
+    return reduce(Rough.__add__, parts)
+
+
+class _Samples:
+    """The samples that wait for a scorer; known: those that have a truth, by their numbers."""
+
+    def __init__(self, scorer: Scorer) -> None:
+        self.drift, self.error = scorer._drift, scorer._error
+        self.field: Any = scorer.system.field
+        self.times, self.states = zip(*(scorer._waiting or ()), strict=True)
+        self.truths = [None if self.error is None else self.error.known(time) for time in self.times]
+        self.known = [i for i, truth in enumerate(self.truths) if truth is not None]
+        self.kept = {i for i, time in enumerate(self.times) if time in scorer.keep} if scorer.keep else set()
+        self.drifts, self.deltas = self._balls()
+        self.errors = cache(self._errors)
+
+    @whole_evaluation
+    def _balls(self) -> tuple[list[list[arb]], list[list[arb]]]:
+        with working_precision(self.drift.bits):
+            states = [to_balls(state) for state in self.states]
+            pairs = [(states[i], self.truths[i] or ()) for i in self.known]
+            deltas = [[value - true for value, true in zip(y, truth, strict=False)] for y, truth in pairs]
+            return [self.drift.values(y) for y in states], deltas
+
+    @whole_evaluation
+    def _errors(self, index: int) -> list[arb]:
+        error, truth = self.error, self.truths[index]
+        assert error is not None
+        assert truth is not None
+        with working_precision(error.bits):
+            return error.values(to_balls(self.states[index][:6]), truth)
+
+    def fill(self, squares: Sequence[Rough]) -> bool:
+        """Whether all digits of the statistics are decided, which are then in the running values.
+
+        squares: of the errors, where there is a truth.
+        """
+        every = range(len(self.times))
+        drifts = zip(self.drift.running.values(), Rough.of(self.drifts).squared(), strict=True)  # type: ignore[call-overload]
+        done = all(
+            self._filled(running, part, every, every, lambda i, j=j: self.drifts[i][j])  # type: ignore[misc]
+            for j, (running, part) in enumerate(drifts)
+        )
+        error = self.error
+        if error is None or not done:
+            return done
+        counted = [place for place, i in enumerate(self.known) if error.counts(self.times[i])]
+        for j, (running, part) in enumerate(zip(error.running.values(), squares, strict=True)):
+            if not self._filled(running, part, self.known, counted, lambda i, j=j: self.errors(i)[j]):  # type: ignore[misc]
+                return False
+        if error.threshold is not None:
+            beyond = squares[0].value + squares[0].error >= float(error.threshold) ** 2 / _ROOM
+            leaving = (self.known[place] for place in numpy.flatnonzero(beyond).tolist())
+            error.escape = next((self.times[i] for i in leaving if error.left(self.errors(i)[0])), None)
+        return True
+
+    def _filled(
+        self,
+        running: Running,
+        squares: Rough,
+        numbers: Sequence[int],
+        counted: Sequence[int],
+        value: Callable[[int], arb],
+    ) -> bool:
+        """Whether the statistics of one quantity are decided.  numbers: of the samples of ``squares``; counted: places
+        among them; value: of the sample with a number.
+        """
+        running.kept = {self.times[i]: abs(value(i)) for i in numbers if i in self.kept}
+        running.count = len(counted)
+        if not counted:
+            return True
+        part = squares[numpy.array(counted)]
+        largest = numpy.flatnonzero(part.value + part.error >= (part.value - part.error).max()).tolist()
+        running.maximum = reduce(larger, (abs(value(numbers[counted[place]])) for place in largest), arb(0))
+        running.final = abs(value(numbers[counted[-1]]))
+        total = math.fsum(part.value)
+        running.squares = arb(total, (math.fsum(part.error) + _ROUNDING * total) * _ROOM)
+        return decided(root(running.squares / running.count))
+
+
+def summarise(scorers: Sequence[Scorer]) -> None:
+    """Bring the running values of scorers up to all their samples; of one motion, whose roundings may differ."""
+    waiting = [scorer for scorer in scorers if scorer.waits]
+    count, kept = sum(scorer.waits for scorer in waiting), sum(len(scorer.keep) for scorer in waiting)
+    if count >= max(_FEW, 2 * kept) and _at_once([_Samples(scorer) for scorer in waiting]):
+        for scorer in waiting:
+            scorer.summarised = True
+    for scorer in waiting:
+        if not scorer.summarised:
+            scorer.one_by_one()
+
+
+@whole_evaluation
+def _at_once(samples: Sequence[_Samples]) -> bool:
+    ends = numpy.cumsum([len(one.known) for one in samples])
+    with numpy.errstate(all="ignore"), working_precision(samples[0].drift.bits):
+        squares = _error_squares(samples) if ends[-1] else [Rough(numpy.zeros(0), numpy.zeros(0))] * 5
+        parts = ([part[end - len(one.known) : end] for part in squares] for one, end in zip(samples, ends, strict=True))
+        return all(one.fill(part) for one, part in zip(samples, parts, strict=True))
+
+
+def _error_squares(samples: Sequence[_Samples]) -> list[Rough]:
+    """The squares of the errors that :meth:`SolutionError.values` gives, of all samples that have a truth."""
+    delta = Rough.of([row for one in samples for row in one.deltas])
+    truth = Rough.of([one.truths[i] or () for one in samples for i in one.known])
+    owners = numpy.repeat(numpy.arange(len(samples)), [len(one.known) for one in samples])
+    numbers: list[list[arb]] = [[] for _ in samples]
+    for one, row in zip(samples, numbers, strict=True):
+        one.drift.parameters.mapped(row.append)
+    columns = iter(Rough.of(numbers)[:, owners])
+    parameters = samples[0].drift.parameters.mapped(lambda _: next(columns))
+    flow = samples[0].field(parameters, [truth[k] for k in range(6)])
+    squares = [delta[k].squared() for k in range(6)]
+    share = _sum(delta[k] * flow[k] for k in range(6)) / _sum(rate.squared() for rate in flow)
+    along = _sum((share * rate).squared() for rate in flow)
+    across = _sum((delta[k] - share * rate).squared() for k, rate in enumerate(flow))
+    # balls give it as the difference of two squares, and resolve it only where that is larger than their radii
+    radii = delta.error - _ROUNDING * abs(delta.value)
+    unresolved = 100 * numpy.sqrt(_sum(squares).value * (radii**2).sum(axis=0)) > across.value
+    across = Rough(across.value, numpy.where(unresolved, math.inf, across.error))
+    size = Rough(numpy.maximum(1.0, abs(truth.value)), truth.error)
+    relative = (delta / size).squared()
+    return [_most(squares[:3]), _most(squares[3:]), along, across, _most([relative[k] for k in range(6)])]
 
 
 # The error of a motion at each of its samples, and the drift of its integrals there, as decimal logarithms.

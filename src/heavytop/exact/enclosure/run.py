@@ -206,9 +206,9 @@ class Pilot:
         times, losses, run = list(known), list(bits), self.run
         while (not times or times[-1] < span) and len(times) < _PILOT_STEPS:
             taken = len(times)
-            if taken and taken % _TRIED == 0:
-                if hopeless(losses[-1], taken * _times_as_far(span, times[-1]) * min(1.0, taken / _SETTLED)):
-                    break
+            part = min(1.0, taken / _SETTLED)
+            if taken and taken % _TRIED == 0 and hopeless(losses[-1], part * taken * _times_as_far(span, times[-1])):
+                break
             following = run.step(node)
             if following is None:
                 break
@@ -385,7 +385,8 @@ _PILOT_ROOM = 72
 """The forecast for a motion such as the generic top of the tests to t = 100: its pilot is the enclosure itself."""
 _MOST_PILOT_BITS = 352
 _HOPELESS, _SURELY = 8, 1.25
-"""Times the effort, and times what a cost may be, beyond which a pilot is abandoned after its first hundred steps."""
+"""Times the effort, and times what a cost may be, beyond which a pilot is abandoned after a hundred steps; after 25 it
+is four times as much."""
 _LARGEST_RATE = 2**100
 _ATTEMPTS = 6
 EFFORT = 900.0
@@ -462,7 +463,7 @@ class Validated:
     def cost(self, time: Fraction, bits: int, most: float | None = None) -> float:
         """Seconds of the model of the cost that the state at ``time`` takes: steps times bits, by no clock.
 
-        most: where it is a quarter more than this, the first hundred steps may tell; None for eight times the effort.
+        most: where it is a quarter more than this, the first steps may tell; None for eight times the effort.
         """
         return 0.0 if time == 0 else self._cost(time, bits, self.start.flat, most=most)
 
