@@ -39,7 +39,9 @@ def audit(
     if library or not claim:
         if not library:
             raise InputError("No claim was given.", "Give a name of `heavytop claims`, a TOML file, or --library.")
-        return _library(claim, system, branch, json)
+        if claim or system is not None or branch is not None:
+            raise InputError("--library audits every claim as it is.", "Leave out the claim, --system and --branch.")
+        return _library(json)
     if branch is not None:
         require_branch(branch)
     if claim in PAPER:
@@ -59,9 +61,7 @@ def audit(
     return report.exit_code
 
 
-def _library(claim: str, system: str | None, branch: str | None, json: bool) -> int:
-    if claim or system is not None or branch is not None:
-        raise InputError("--library audits every claim as it is.", "Leave out the claim, --system and --branch.")
+def _library(json: bool) -> int:
     listed = _listed(None, anew=True)
     if json:
         print_json(listed.to_json())

@@ -5,7 +5,7 @@ matplotlib is drawn without a display and without a date, so that the same progr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -101,18 +101,19 @@ class Curves:
     angles: NDArray[numpy.float64]
 
 
-def draw_figures(
-    directory: Path, progress: Callable[[], None] = lambda: None, figures: Mapping[str, Callable[[], Any]] | None = None
-) -> list[Path]:
+def draw_figures(directory: Path, progress: Callable[[], None] = lambda: None) -> list[Path]:
     """The files written into ``directory``: each figure as SVG and as PNG (at least 800 px wide).
 
-    progress: called after each figure.  figures: some of :data:`FIGURES`, all where None.
+    progress: called after each figure.
     """
     files: list[Path] = []
     with _quiet_style():
         directory.mkdir(parents=True, exist_ok=True)
-        for name, drawn in (FIGURES if figures is None else figures).items():
-            files += _save(drawn(), directory / name)
+        for name, drawn in FIGURES.items():
+            figure, (svg, png) = drawn(), (directory / f"{name}.{kind}" for kind in ("svg", "png"))
+            svg.write_text(document(figure), "utf-8")
+            figure.savefig(png, dpi=110, metadata={"Software": "heavytop"})
+            files += [svg, png]
             progress()
     return files
 
@@ -132,13 +133,6 @@ def _quiet_style() -> Iterator[None]:
     }
     with matplotlib.rc_context(settings):
         yield
-
-
-def _save(figure: Any, stem: Path) -> list[Path]:
-    svg, png = stem.with_suffix(".svg"), stem.with_suffix(".png")
-    svg.write_text(document(figure), "utf-8")
-    figure.savefig(png, dpi=110, metadata={"Software": "heavytop"})
-    return [svg, png]
 
 
 def _paper_figure(spec: PaperFigure) -> Any:

@@ -99,8 +99,11 @@ def hunt(
         raise InputError(f"limit = {quoted(limit)} is not above 0.", "Give a positive number, or leave it out.")
     if other is not None and other == which:
         raise InputError("An integrator is not hunted against itself.", "Give another with --against, or none.")
+    first = as_integer(seed, "seed")
+    if not 0 <= first <= 10**9:
+        raise InputError(f"seed must be in range; got {quoted(first)}.", "Give a number from 0 to 1000000000.")
     pair = described(which), None if other is None else described(other)
-    asked = Asked(pair[0], form, time, family, pair[1], beyond, motions, seconds, _seed(seed))
+    asked = Asked(pair[0], form, time, family, pair[1], beyond, motions, seconds, first)
     try:
         hunted = search(asked, arguments.callback(advance, "advance"))
     finally:
@@ -108,13 +111,6 @@ def hunt(
     name = integrator if isinstance(integrator, str) else asked.integrator.name
     again = _again(asked, name, against, hunted.planned)
     return Hunt(documents(hunted, name), hunted.motions, asked.seed, hunted, again)
-
-
-def _seed(value: int) -> int:
-    number = as_integer(value, "seed")
-    if not 0 <= number <= 10**9:
-        raise InputError(f"seed must be in range; got {quoted(number)}.", "Give a number from 0 to 1000000000.")
-    return number
 
 
 def _budget(value: int | str) -> tuple[int | None, float | None]:

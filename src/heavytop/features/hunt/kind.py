@@ -90,9 +90,10 @@ class HuntKind(Kind):
             keep(Path(task.options[-1]), [m.motion for m in hunted.found])
         if hunted.found:
             return failed(task, _said(hunted))
-        return exact_row(
-            task, _measured(hunted), Against("equations", _law(hunted)), _metrics(hunted), asked.precision.bits
-        )
+        lost = f"{hunted.lost} of which no format of its size can follow"
+        measured = f"the worst of {hunted.motions} motions, {lost}"
+        law = f"{hunted.law:.2g} eps times the motion's amplification times the root of its radians"
+        return exact_row(task, measured, Against("equations", law), _metrics(hunted), asked.precision.bits)
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
         """The search that came nearest to a finding; a line a row."""
@@ -131,14 +132,6 @@ def _metrics(hunted: Hunted) -> dict[str, Metric]:
     worst = max((m.error / m.explained(eps) / hunted.law for m in hunted.worst), default=0.0)
     values = {WORST: worst, MEDIAN: hunted.median}
     return by_name({q: of_fraction(Fraction(v), "error") for q, v in values.items() if math.isfinite(v)})
-
-
-def _law(hunted: Hunted) -> str:
-    return f"{hunted.law:.2g} eps times the motion's amplification times the root of its radians"
-
-
-def _measured(hunted: Hunted) -> str:
-    return f"the worst of {hunted.motions} motions, {hunted.lost} of which no format of its size can follow"
 
 
 def _line(row: Row) -> str:

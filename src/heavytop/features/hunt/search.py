@@ -385,18 +385,17 @@ class _Hunt:
         self._begin()
         self._take(kept)
         index, batch = FIRST, 0
-        while not self.hits and self._done() < self.planned:
-            count = min(FIRST, self.planned - self._done())
-            if batch % 4 < (3 if self._done() < self.planned // 4 else 1):
+        while not self.hits and (done := len(self.all)) < self.planned:
+            count = min(FIRST, self.planned - done)
+            if batch % 4 < (3 if done < self.planned // 4 else 1):
                 motions = [drawn(asked.seed, index + i, asked.family, asked.horizon) for i in range(count)]
                 index += count
             else:
                 motions = [self._changed(batch, i) for i in range(count)]
             self._take(self.meter.measure(motions))
             batch += 1
-            self.advance(self._done(), self.planned)
-        done = self._done()
-        return self._ended(done, self._shrunk())
+            self.advance(len(self.all), self.planned)
+        return self._ended(len(self.all), self._shrunk())
 
     def _begin(self) -> None:
         """The first 64 motions: what they cost, the law of the integrator, and whether they show anything."""
@@ -420,9 +419,6 @@ class _Hunt:
             ninth: float = quantiles(ratios, n=10, method="inclusive")[-1]
             self.law = max(_LEAST_LAW, ninth)
         self._take(first)
-
-    def _done(self) -> int:
-        return len(self.all)
 
     def _changed(self, batch: int, index: int) -> Motion:
         seed = f"{self.asked.seed}/change/{batch}/{index}"

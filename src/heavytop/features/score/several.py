@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from heavytop.errors import ExitCode, InputError
-from heavytop.features.score.api import Score, read_trajectory, scored
+from heavytop.features.score.api import read_trajectory, scored
 from heavytop.features.score.text import cause, requirement
 from heavytop.measure.scalar import RELATIVE, digits_text
 from heavytop.precision import DOUBLE, exact_text
@@ -78,12 +78,9 @@ def _scored_file(path: str, case: str | None, require: str | None, normalize: bo
     said = "; ".join(f"{fit.kind}: {cause(fit, score.row.system)}" for fit in score.assessment.diagnoses)
     method, step = (motion.integrator, *body), motion.step or Fraction(0)
     required = "" if needed is None else requirement(score.row, needed, motion.cut)
-    return ScoredFile(path, document, score.exit_code, digits, said, method, step, _error(score), required)
-
-
-def _error(score: Score) -> float | None:
     metric = score.row.metrics.get(RELATIVE.text)
-    return None if metric is None or metric.log10 is None else float(metric)
+    largest = None if metric is None or metric.log10 is None else float(metric)
+    return ScoredFile(path, document, score.exit_code, digits, said, method, step, largest, required)
 
 
 def orders(files: Sequence[ScoredFile]) -> Iterator[Order]:

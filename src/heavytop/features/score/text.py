@@ -346,7 +346,8 @@ def answer(row: Row, peer: Peer | None) -> list[str]:
     if row.outcome != "success":
         lines.append(f"The run ended early ({row.outcome}), at t = {row.time_reached} of {row.horizon}.")
     if digits is None:
-        return [*lines, _without_digits(row)]
+        unknown = "How many digits are right is not known: there is no reference. Drift is measured."
+        return [*lines, unknown if row.samples else "No digit can be counted: the first state is not finite."]
     where = "every sample up to" if row.samples > 1 else "its one sample,"
     said = f"{digits_text(digits)} of {digits_of(row.bits)} digits right at {where} T = {short(row.time_reached)}"
     if peer is not None:
@@ -356,12 +357,6 @@ def answer(row: Row, peer: Peer | None) -> list[str]:
     if mostly is not None:
         lines.append(_DIRECTIONS[mostly])
     return lines
-
-
-def _without_digits(row: Row) -> str:
-    if not row.samples:
-        return "No digit can be counted: the first state is not finite."
-    return "How many digits are right is not known: there is no reference. Drift is measured."
 
 
 def requirement(row: Row, needed: Fraction, cut: str = "") -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -180,7 +181,7 @@ class Gathered:
     def __init__(self, first: Row, task: Task) -> None:
         self._row, self._task = first, task
         self._values: dict[str, list[Any]] = {name: [] for name in _QUANTITIES}
-        self._outcomes: dict[str, int] = {}
+        self._outcomes: Counter[str] = Counter()
         self._digits: list[Any] = []
         self._steps = 0
         self._worst: list[_Bad] = []
@@ -197,8 +198,7 @@ class Gathered:
         for name, values in [*self._map.items(), ("", self._digits)]:
             values.append(table[name or "digits_right"].to_numpy())
         outcomes = table["outcome"].cast("string").to_pylist()
-        for outcome in outcomes:
-            self._outcomes[outcome] = self._outcomes.get(outcome, 0) + 1
+        self._outcomes.update(outcomes)
         self._steps += int(sum(table["steps"].to_pylist()))
         error = table["error_max"].to_numpy()
         error = numpy.where(numpy.isnan(error), 0.0, error)
@@ -212,8 +212,8 @@ class Gathered:
         """The row of the report."""
         sweep = sweep_of(self._task)
         name, cases = sweep.name, sweep.cases()
-        motions = sum(self._outcomes.values())
-        failed = motions - self._outcomes.get(Outcome.SUCCESS.value, 0)
+        motions = self._outcomes.total()
+        failed = motions - self._outcomes[Outcome.SUCCESS.value]
         counts = {Quantity(COUNT, outcome): n for outcome, n in sorted(self._outcomes.items())}
         metrics = {q: Metric(str(n), math.log10(n), "value") for q, n in counts.items()}
         sorted_values = {column: numpy.sort(numpy.concatenate(values)) for column, values in self._values.items()}

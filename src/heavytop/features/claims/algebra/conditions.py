@@ -196,16 +196,9 @@ def is_exactly_zero(expression: sympy.Expr, values: Mapping[sympy.Symbol, Fracti
 
 _ONLY_ZERO = {
     # f(u) = value at one real u alone
-    "exp": (1, 0),
-    "cosh": (1, 0),
-    "sech": (1, 0),
-    "sinh": (0, 0),
-    "tanh": (0, 0),
-    "atan": (0, 0),
-    "asin": (0, 0),
-    "Abs": (0, 0),
-    "acos": (0, 1),
-    "log": (0, 1),
+    **dict.fromkeys(("exp", "cosh", "sech"), (1, 0)),
+    **dict.fromkeys(("sinh", "tanh", "atan", "asin", "Abs"), (0, 0)),
+    **dict.fromkeys(("acos", "log"), (0, 1)),
 }
 _ANALYTIC = (sympy.sin, sympy.cos, sympy.exp, sympy.sinh, sympy.cosh, sympy.tanh, sympy.sech, sympy.atan, sympy.log)
 # a polynomial of more terms is left as it is

@@ -37,18 +37,8 @@ from heavytop.top.equations import (
     momentum_squared,
 )
 
-SYMBOLIC = SimpleNamespace(
-    sqrt=sympy.sqrt,
-    exp=sympy.exp,
-    log=sympy.log,
-    sin=sympy.sin,
-    cos=sympy.cos,
-    tanh=sympy.tanh,
-    sech=sympy.sech,
-    arctan=sympy.atan,
-    arccos=sympy.acos,
-    atan2=sympy.atan2,
-)
+_NAMES = ("sqrt", "exp", "log", "sin", "cos", "tanh", "sech", "atan2")
+SYMBOLIC = SimpleNamespace(**{n: getattr(sympy, n) for n in _NAMES}, arctan=sympy.atan, arccos=sympy.acos)
 
 Derivative = Callable[[sympy.Expr], sympy.Expr]
 Triple = tuple[sympy.Expr, sympy.Expr, sympy.Expr]

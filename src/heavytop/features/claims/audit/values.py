@@ -32,7 +32,7 @@ from heavytop.features.claims.audit.context import Tensor, Text, Three, of_file
 from heavytop.features.claims.audit.judge import StatementVerdict
 from heavytop.features.claims.library.entry import Entry
 from heavytop.precision import decimal_text, dot, exact, round_to
-from heavytop.top.attitude import Attitude, Output, rotated, transposed
+from heavytop.top.attitude import Output, rotated, transposed
 from heavytop.top.bodies import Body, motion_of
 from heavytop.top.equations import (
     HEAVY_GYROSTAT,
@@ -444,6 +444,7 @@ class _KnownNumbers:
         integrals = holding(resolved.top, resolved.start, self.system)
         return {integral.name: integral for integral in integrals if self._exact or integral.name in _INVARIANT}
 
+    @whole_evaluation
     def at(self, time: Fraction, quantity: str, bits: int) -> Sequence[Fraction | arb]:
         """The components of a quantity, of ``bits`` bits: relative above 1, absolute below.
 
@@ -456,18 +457,11 @@ class _KnownNumbers:
                 return self.start.omega if quantity == "omega" else self.start.gamma
             state = self.motion.state(time, bits)
             return state[:3] if quantity == "omega" else state[3:6]
-        if self.start.attitude is None:
-            return self._height(self.motion.state(time, bits), bits)
-        return self._output(Output(quantity.replace("_", "-")), self.motion.with_attitude(time, bits), bits)
-
-    @whole_evaluation
-    def _height(self, state: Sequence[arb], bits: int) -> list[arb]:
-        """A position of which the third component is known."""
-        with working_precision(bits + _SPARE_BITS):
-            return [arb("nan"), arb("nan"), dot([ball(value) for value in self.body.centre], state[3:6])]
-
-    @whole_evaluation
-    def _output(self, output: Output, motion: Sequence[arb], bits: int) -> list[arb]:
+        if self.start.attitude is None:  # a position of which the third component is known
+            state = self.motion.state(time, bits)
+            with working_precision(bits + _SPARE_BITS):
+                return [arb("nan"), arb("nan"), dot([*map(ball, self.body.centre)], state[3:6])]
+        output, motion = Output(quantity.replace("_", "-")), self.motion.with_attitude(time, bits)
         with working_precision(bits + _SPARE_BITS):
             components = list(output.at(motion[:3], motion[3:6], motion[6:], self.body.centre, FUNCTIONS, ball))
         if not all(value.is_finite() for value in components):
@@ -484,15 +478,11 @@ class _KnownNumbers:
         p = Parameters(tensor, body.moment, body.rotor or (Fraction(0),) * 3)
         if start.attitude is None or start.attitude.exact_rows() is not None:
             return exact(integral.value(p, start.flat))
-        return self._integral_of_balls(integral, p, start.attitude, bits)
-
-    @whole_evaluation
-    def _integral_of_balls(self, integral: Integral, p: Parameters, attitude: Attitude, bits: int) -> arb:
         with working_precision(bits + 4 * _SPARE_BITS):
-            rows = attitude.rows(FUNCTIONS, ball)
-            omega, space = _balls(self.start.omega), self.start.omega_space
-            if space is not None:
-                omega = rotated(transposed(rows), _balls(space))
+            rows = start.attitude.rows(FUNCTIONS, ball)
+            omega = _balls(start.omega)
+            if start.omega_space is not None:
+                omega = rotated(transposed(rows), _balls(start.omega_space))
             return arb(integral.value(type(p)(*map(_balls, p)), (*omega, *rows[2])))
 
 

@@ -545,19 +545,12 @@ def _fitted(seen: Seen, course: Course) -> Iterator[Row]:
     yield "pivot", {"offset": _list(offset)}, {"columns": replace(said, offset=tuple(offset)), **_FITTED}
     own = numpy.einsum("nji,nj->ni", course.rotation, positions).mean(axis=0)
     yield "point", {"point": _list(own)}, {"columns": replace(said, point=tuple(own)), **_FITTED}
-    both = _point_and_offset(course, positions)
-    if both is not None:
+    design = numpy.concatenate([course.rotation, numpy.tile(numpy.eye(3), (len(positions), 1, 1))], axis=2)
+    if len(positions) >= _FEWEST and numpy.isfinite(design).all() and numpy.isfinite(positions).all():
+        both = numpy.linalg.lstsq(design.reshape(-1, 6), positions.reshape(-1), rcond=None)[0]
         reading = replace(said, point=tuple(both[:3]), offset=tuple(both[3:]))
         numbers = {"point": _list(both[:3]), "offset": _list(both[3:])}
         yield "point_and_pivot", numbers, {"columns": reading, **_FITTED}
-
-
-def _point_and_offset(course: Course, positions: Array) -> Array | None:
-    design = numpy.concatenate([course.rotation, numpy.tile(numpy.eye(3), (len(positions), 1, 1))], axis=2)
-    if not numpy.isfinite(design).all() or not numpy.isfinite(positions).all() or len(positions) < 4:
-        return None
-    solution: Array = numpy.linalg.lstsq(design.reshape(-1, 6), positions.reshape(-1), rcond=None)[0]
-    return solution
 
 
 def _turned(seen: Seen, course: Course) -> Iterator[Row]:

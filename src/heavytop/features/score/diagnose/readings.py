@@ -326,39 +326,27 @@ def residuals(seen: Seen, course: Course, reading: Reading, body: BodyData) -> A
 
 
 def _residual(seen: Seen, course: Course, reading: Reading, body: BodyData, name: str, values: Array) -> Array:
+    size, true = 1.0, course.rotation
     if name == "position":
-        return _position_error(seen, course, reading, values)
-    if name == "gamma":
-        gamma: Array = reading.body_vectors(values) / reading.gamma - course.rotation[:, 2]
-        return gamma
-    if name in ("omega", "omega_space"):
-        return _omega_error(course, reading, body, name, values)
-    return (reading.rotation(name, values) - course.rotation).reshape(len(values), 9)
-
-
-def _omega_error(course: Course, reading: Reading, body: BodyData, name: str, values: Array) -> Array:
-    omega = course.omega
-    if reading.momentum:
-        omega = omega @ body.tensor
-    if (name == "omega_space") != reading.swapped:
-        true = numpy.einsum("nij,nj->ni", course.rotation, omega)
-        vectors = reading.vectors(values, True)
+        point = seen.point if reading.point is None else numpy.array(reading.point)
+        true = course.rotation @ point
+        if reading.displaced:
+            true = true - seen.start.begin(reading, numpy.eye(3)).rotation @ point
+        size = float(numpy.linalg.norm(point)) or 1.0
+        read = (reading.vectors(values - seen.pivot) - numpy.array(reading.offset)) / reading.scale
+    elif name == "gamma":
+        read, true = reading.body_vectors(values) / reading.gamma, course.rotation[:, 2]
+    elif name in ("omega", "omega_space"):
+        true = course.omega @ body.tensor if reading.momentum else course.omega
+        in_space = (name == "omega_space") != reading.swapped
+        if in_space:
+            true = numpy.einsum("nij,nj->ni", course.rotation, true)
+        size = float(numpy.linalg.norm(true, axis=1).max()) or 1.0
+        read = (reading.vectors if in_space else reading.body_vectors)(values, True) / reading.omega
     else:
-        true, vectors = omega, reading.body_vectors(values, True)
-    size = float(numpy.linalg.norm(true, axis=1).max()) or 1.0
-    errors: Array = (vectors / reading.omega - true) / size
-    return errors
-
-
-def _position_error(seen: Seen, course: Course, reading: Reading, values: Array) -> Array:
-    point = seen.point if reading.point is None else numpy.array(reading.point)
-    true = course.rotation @ point
-    if reading.displaced:
-        true = true - seen.start.begin(reading, numpy.eye(3)).rotation @ point
-    size = float(numpy.linalg.norm(point)) or 1.0
-    positions = reading.vectors(values - seen.pivot)
-    errors: Array = ((positions - numpy.array(reading.offset)) / reading.scale - true) / size
-    return errors
+        read = reading.rotation(name, values)
+    off: Array = ((read - true) / size).reshape(len(values), -1)
+    return off
 
 
 def rates_off(seen: Seen, reading: Reading) -> Array | None:

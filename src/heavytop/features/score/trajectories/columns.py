@@ -326,12 +326,8 @@ _ARRAYS = {
 KEYS = {*CONVENTIONS, *STARTS, *BODIES, *_ARRAYS}
 _REMEDY = "`heavytop docs score` shows what a file may hold."
 _ORDERS = {
-    "wxyz": "wxyz",
-    "scalar first": "wxyz",
-    "scalar_first": "wxyz",
-    "xyzw": "xyzw",
-    "scalar last": "xyzw",
-    "scalar_last": "xyzw",
+    **dict.fromkeys(("wxyz", "scalar first", "scalar_first"), "wxyz"),
+    **dict.fromkeys(("xyzw", "scalar last", "scalar_last"), "xyzw"),
 }
 
 
