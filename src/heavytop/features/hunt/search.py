@@ -531,8 +531,21 @@ _PASTE = "It holds [[top]] tables, as heavytop hunt prints them."
 
 def documents(hunted: Hunted, integrator: str) -> list[dict[str, Any]]:
     """Each motion found, worst first, by the keys of `hunt --json`; integrator: as the user named it."""
-    pairs = zip(hunted.found, hunted.proofs, strict=True)
-    return [_document(hunted.asked, m, p, integrator, i) for i, (m, p) in enumerate(pairs, 1)]
+    asked, entries = hunted.asked, []
+    eps = float(asked.precision.eps)
+    for number, (m, proven) in enumerate(zip(hunted.found, hunted.proofs, strict=True), 1):
+        case = case_of(m.motion, number)
+        more = {
+            "system": case.system.name,
+            "digits_lost": digits_lost(proven.error, eps),
+            "ratio": ratio(proven.error, proven.other, eps),
+            "outcome": m.outcome,
+            "class": class_of(*m.motion),
+            "command": command_of(asked, m.motion, integrator, math.isinf(m.error)),
+            "toml": forms(case)["toml"],
+        }
+        entries.append({**data_texts(*m.motion), **more})
+    return entries
 
 
 def digits_lost(error: float, eps: float) -> float:
@@ -563,22 +576,6 @@ def command_of(asked: Asked, motion: Motion, integrator: str, failed: bool) -> s
     name = "" if asked.precision.name == "double" else f" --precision {asked.precision.name}"
     line += f" --times {times}{name} --integrator {quote(integrator)}"
     return line if failed else f"{line} --json | heavytop score -"
-
-
-def _document(asked: Asked, m: MeasuredMotion, proven: Proof, integrator: str, number: int) -> dict[str, Any]:
-    eps = float(asked.precision.eps)
-    case = case_of(m.motion, number)
-    failed = math.isinf(m.error)
-    return {
-        **data_texts(*m.motion),
-        "system": case.system.name,
-        "digits_lost": digits_lost(proven.error, eps),
-        "ratio": ratio(proven.error, proven.other, eps),
-        "outcome": m.outcome,
-        "class": class_of(*m.motion),
-        "command": command_of(asked, m.motion, integrator, failed),
-        "toml": forms(case)["toml"],
-    }
 
 
 def kept(path: Path) -> tuple[Motion, ...]:

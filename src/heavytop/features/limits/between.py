@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import lru_cache
+from functools import cache, partial
 from typing import Any
 
 import numpy
@@ -98,30 +98,23 @@ def between_samples(
     count = int(-(-end // step))
     if count > _MOST:
         raise InputError(f"{count} intervals are more than {_MOST}.", "Give a larger spacing, or an earlier time.")
-    errors = lru_cache(maxsize=None)(_Sampled(body, state, about, end).errors)
+    errors = cache(partial(_errors, body, state, about, end))
     largest = {} if wanted is None else {name: _largest(errors, name, wanted, end, count) for name in METHODS}
     return BetweenSamples(end, end / count, errors(count), wanted, largest, step)
 
 
-@dataclass(frozen=True)
-class _Sampled:
-    """A motion in principal axes, sampled in double."""
-
-    body: HeavyTop | Body
-    start: State
-    system: System
-    until: Fraction
-
-    def errors(self, count: int) -> dict[str, float | None]:
-        """By method, of ``count`` intervals."""
-        setup = Setup.of(self.body, self.start, arguments.precision("double"), self.system)
-        run = propagator("heyoka", {"xi": setup.xi})
-        times = check_times(numpy.arange(count * _PARTS + 1) * float(self.until / (count * _PARTS)))
-        trajectory = run(setup.top, setup.start, times, system=self.system)
-        trajectory = replace(trajectory, states=trajectory.states[:, :6], attitude=trajectory.states[:, 6:])
-        y, q = trajectory.states.T, trajectory.quaternions().T
-        rates = numpy.array(numpy.broadcast_arrays(*self.system.field(trajectory.problem.parameters.mapped(float), y)))
-        return _compared(y, q, rates[:, ::_PARTS] * float(self.until / count))
+def _errors(
+    body: HeavyTop | Body, start: State, system: System, until: Fraction, count: int
+) -> dict[str, float | None]:
+    """By method, of ``count`` intervals of a motion in principal axes, sampled in double."""
+    setup = Setup.of(body, start, arguments.precision("double"), system)
+    run = propagator("heyoka", {"xi": setup.xi})
+    times = check_times(numpy.arange(count * _PARTS + 1) * float(until / (count * _PARTS)))
+    trajectory = run(setup.top, setup.start, times, system=system)
+    trajectory = replace(trajectory, states=trajectory.states[:, :6], attitude=trajectory.states[:, 6:])
+    y, q = trajectory.states.T, trajectory.quaternions().T
+    rates = numpy.array(numpy.broadcast_arrays(*system.field(trajectory.problem.parameters.mapped(float), y)))
+    return _compared(y, q, rates[:, ::_PARTS] * float(until / count))
 
 
 def _compared(y: Array, q: Array, slopes: Array) -> dict[str, float | None]:

@@ -76,39 +76,29 @@ class Arcs:
                     self._forms[index] = form
 
     def _form_of(self, index: int) -> fmpq_mpoly | None:
-        """Inverse function ``index`` through those before it and π; None without such a relation."""
-        field = self._field
-        is_log = field.tower.generators[index].kind == "log"
-        alike = [other for other in self._free if (field.tower.generators[other].kind == "log") is is_log]
-        arcs = [*alike, index]
-        if is_log:
-            return self._form_of_logarithm(arcs)
-        pi = field.enter(sympy.pi).numerator
-        factors = _integer_relation([self._values(arc) for arc in (*arcs, *used(pi))])
-        if factors is None or not factors[-2]:
+        """A function through those of its kind before it, an arc also through π; None without such a relation."""
+        tower = self._field.tower
+        is_log = tower.generators[index].kind == "log"
+        alike = [other for other in self._free if (tower.generators[other].kind == "log") is is_log]
+        pi = [] if is_log else [*used(self._field.enter(sympy.pi).numerator)]
+        factors = _integer_relation([self._values(arc) for arc in (*alike, index, *pi)])
+        if factors is None or not factors[len(alike)]:
             return None
-        weights = {arc: factor for arc, factor in zip(arcs, factors[:-1], strict=True) if factor}
-        if not self._is_proven(weights, -factors[-1]):
+        weights = {arc: factor for arc, factor in zip((*alike, index), factors, strict=False) if factor}
+        if not (self._is_power_product_one(weights) if is_log else self._is_proven(weights, -factors[-1])):
             return None
-        gens, total = field.tower.gens, pi * factors[-1]
-        for arc, factor in weights.items():
-            if arc != index:
-                total += gens[arc] * factor
+        others = {arc: factor for arc, factor in weights.items() if arc != index}
+        others |= dict.fromkeys(pi, factors[-1])
+        total = sum((tower.gens[arc] * factor for arc, factor in others.items()), tower.context.constant(0))
         return total / -weights[index]
 
-    def _form_of_logarithm(self, logarithms: list[int]) -> fmpq_mpoly | None:
-        """The last logarithm through the others: a product of powers of what they are taken of is 1."""
+    def _is_power_product_one(self, weights: dict[int, int]) -> bool:
+        """Whether the product of these powers of what logarithms are taken of is 1."""
         tower = self._field.tower
-        factors = _integer_relation([self._values(index) for index in logarithms])
-        if factors is None or not factors[-1] or sum(map(abs, factors)) > _MOST_TURNS:
-            return None
-        weights = {index: factor for index, factor in zip(logarithms, factors, strict=True) if factor}
+        if sum(map(abs, weights.values())) > _MOST_TURNS:
+            return False
         parts = (tower.generators[index].arguments[0] ** factor for index, factor in weights.items())
-        if prod(parts, start=tower.number(1)) != tower.number(1):
-            return None
-        last = logarithms[-1]
-        total = sum((tower.gens[i] * factor for i, factor in weights.items() if i != last), tower.context.constant(0))
-        return total / -weights[last]
+        return prod(parts, start=tower.number(1)) == tower.number(1)
 
     def _values(self, index: int) -> list[arb]:
         """Its values at a few sample points of the region; of a number, the number."""
