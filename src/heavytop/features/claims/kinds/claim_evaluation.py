@@ -143,19 +143,17 @@ def _cells(row: Row) -> list[Cell]:
 
 def _summary(rows: Sequence[Row]) -> str:
     """``is off by up to 6.7e-8 in Ω (ershkov-partial-6/forward), ψ not finite from |t| = 7.4``."""
-    errors = ((row.metrics[Quantity(EVALUATION_ERROR, "omega", _WORST).text], row.case) for row in rows)
-    times = ((row.metrics[Quantity(_COUNT, name, _SINCE).text], name) for row in rows for name in _SYMBOLS)
-    worst = max(
-        ((metric.log10, metric.value, case) for metric, case in errors if metric.log10 is not None), default=None
-    )
-    since = min(
-        ((metric.log10, metric.value, name) for metric, name in times if metric.log10 is not None), default=None
-    )
-    off = "has no finite error of Ω" if worst is None else f"is off by up to {short(worst[1])} in Ω ({worst[2]})"
+
+    def known(name: str, component: str, statistic: str) -> list[tuple[float, str, str, str]]:
+        pairs = ((row.metrics[Quantity(name, component, statistic).text], row.case) for row in rows)
+        return [(m.log10, m.value, component, case) for m, case in pairs if m.log10 is not None]
+
+    worst = max(known(EVALUATION_ERROR, "omega", _WORST), default=None)
+    since = min([time for name in _SYMBOLS for time in known(_COUNT, name, _SINCE)], default=None)
+    off = "has no finite error of Ω" if worst is None else f"is off by up to {short(worst[1])} in Ω ({worst[3]})"
     if since is None:
         return f"{off}, finite throughout"
-    overflow = [row.metrics[Quantity(_COUNT, "omega", _SINCE).text] for row in rows]
-    finite = min(((time.log10, time.value) for time in overflow if time.log10 is not None), default=None)
+    finite = min(known(_COUNT, "omega", _SINCE), default=None)
     if finite is not None and worst is not None:
         off += f" while Ω is finite, before |t| = {short(finite[1])}"
     return f"{off}, {_SYMBOLS[since[2]]} not finite from |t| = {short(since[1])}"
