@@ -14,7 +14,7 @@ import pytest
 
 import heavytop as ht
 from heavytop.errors import InputError, OutOfReach
-from heavytop.features.events.functions import event_function
+from heavytop.features.events.functions import Wanted, event_function
 from heavytop.features.events.located import locate
 from heavytop.integrate.dense import Dense, Piece
 from heavytop.integrate.trajectory import Problem
@@ -301,7 +301,7 @@ def broken(first, second):
 )
 def test_a_change_at_the_common_end_of_two_steps_counts_once(first, second, count) -> None:
     problem = Problem.of(TOP, START, ht.DOUBLE)
-    found = locate(Dense(broken(first, second), problem, Fraction(2)), "planted", event_function("omega1"), 0)
+    found = locate(Dense(broken(first, second), problem, Fraction(2)), "planted", Wanted(event_function("omega1")))
     assert len(found) == count
     assert all(abs(float(t) - 1) < 1e-12 for t in found.times)
 

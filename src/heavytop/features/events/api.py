@@ -15,10 +15,10 @@ from heavytop.exact.flint.balls import require_handy, value_text
 from heavytop.exact.resolved import Resolved, resolve
 from heavytop.features.events.functions import (
     PROVEN,
-    EventFunction,
     Events,
     ReferenceEvents,
     Section,
+    Wanted,
     event_function,
     first_term,
     in_body_axes,
@@ -119,8 +119,7 @@ def events(
             decided whether the function changes sign or only touches zero.
     """
     which, way = event_function(function), require_direction(direction)
-    most = arguments.count(limit, "limit")
-    arguments.callback(reached, "reached")
+    wanted = Wanted(which, way, arguments.count(limit, "limit"), arguments.callback(reached, "reached"))
     if digits is None:
         form = arguments.precision(precision)
         body, state = arguments.motion(top, start, form)
@@ -131,29 +130,22 @@ def events(
             own = which if axes is None else in_body_axes(which, axes)
             first_term(own, setup.system, setup.system.parameters(setup.top, setup.start), setup.start.flat)
         run = dense(named_one, setup.problem, end, *limits)
-        return locate(run, str(named_one), which, way, most, reached, axes)
+        return locate(run, str(named_one), wanted, axes)
     if (precision, integrator, tolerance, step_limit) != (DOUBLE, "heyoka", None, None):
         raise InputError(
             "Proven events (digits) know no precision, integrator, tolerance or step_limit.",
             "Leave these out, or digits.",
         )
     body, state = arguments.motion(top, start, of_any_size=True)
-    known = _until(until), which, way, as_integer(digits, "digits"), arguments.system(system, body), most, reached
+    known = arguments.system(system, body), _until(until), wanted, as_integer(digits, "digits")
     return _known_events(body, state, *known)
 
 
 def _known_events(
-    top: HeavyTop | Body,
-    start: State,
-    until: Fraction,
-    function: EventFunction,
-    direction: int,
-    digits: int,
-    system: System,
-    limit: int | None,
-    reached: Reached | None,
+    top: HeavyTop | Body, start: State, system: System, until: Fraction, wanted: Wanted, digits: int
 ) -> ReferenceEvents:
     """Proven events of a motion that was checked."""
+    function = wanted.function
     if digits not in DIGITS:
         raise InputError(f"digits must be from 1 to 20000; got {quoted(digits)}.", "Give, for example, 50.")
     if not function.rational:
@@ -166,13 +158,13 @@ def _known_events(
     method = "validated: Taylor enclosure" + (" of irrational data" if resolved.uncertainty else "")
     solution = Validated(resolved.top, resolved.start, system, method=method, uncertainty=resolved.uncertainty)
     try:
-        events = proven_events(solution, until, function, direction, digits, limit, reached, resolved)
+        events = proven_events(solution, until, wanted, digits, resolved)
     except OutOfReach as error:
         remedy = f"{error.remedy} Computed ones reach further: leave digits out, and ask for quad or real:BITS."
         raise OutOfReach(error.cause, remedy) from None
     return ReferenceEvents(
         function=function.name,
-        direction=direction,
+        direction=wanted.direction,
         guarantee=PROVEN,
         method=solution.method,
         digits=digits,

@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence, Sized
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy
@@ -184,6 +184,19 @@ class EventFunction:
             return list(range(6))
         degrees = [max(pair) for pair in zip(self.numerator.degrees(), self.denominator.degrees(), strict=True)]
         return [index for index, degree in enumerate(degrees) if degree > 0]
+
+
+class Wanted(NamedTuple):
+    """The events that are asked for.
+
+    direction: 1 for those at which the function rises with time, −1 where it falls, 0 for all.
+    limit: stop after so many.  reached: called with the times on the way.
+    """
+
+    function: EventFunction
+    direction: int = 0
+    limit: int | None = None
+    reached: Callable[[Fraction], None] | None = None
 
 
 def event_function(function: Any) -> EventFunction:

@@ -21,6 +21,7 @@ from heavytop.features.events.functions import (
     SAMPLED,
     EventFunction,
     Events,
+    Wanted,
     arrays,
     composed,
     in_body_axes,
@@ -56,26 +57,16 @@ class Found(NamedTuple):
     discontinuity: str = ""
 
 
-def locate(
-    run: Dense,
-    integrator: str,
-    function: EventFunction,
-    direction: int,
-    limit: int | None = None,
-    reached: Callable[[Fraction], None] | None = None,
-    axes: Axes | None = None,
-) -> Events:
-    """The events of a run, up to its ``until``.
+def locate(run: Dense, integrator: str, wanted: Wanted, axes: Axes | None = None) -> Events:
+    """The events of a run, up to its ``until``; it is told the time of each step.
 
     axes: the rows of A where the function is of v_given = A v, and the states are wanted in these axes; None for those
     of the run.
-    direction: 1 for those at which the function rises with time, −1 for those at which it falls, 0 for all.
-    limit: stop after so many.  reached: called with the time of each step.
     Raises InputError where a callable raises, or gives no finite number.
     """
-    precision, forwards = run.problem.precision, run.until > 0
+    precision, forwards, function = run.problem.precision, run.until > 0, wanted.function
     inner = function if axes is None else in_body_axes(function, axes)
-    found_in = _watched(run, reached)
+    found_in = _watched(run, wanted.reached)
     events = (
         _of_rational(inner, found_in, precision)
         if function.rational
@@ -91,7 +82,7 @@ def locate(
             discontinuities.append((_native_time(event.piece.time(event.s), precision), event.discontinuity))
             continue
         sign = 1 if event.rising == forwards else -1
-        if direction not in (0, sign):
+        if wanted.direction not in (0, sign):
             continue
         state = native_state(_given(event.piece.state(event.s), axes), precision)
         if state is None:
@@ -100,13 +91,13 @@ def locate(
         times.append(_native_time(event.piece.time(event.s), precision))
         states.append(state)
         directions.append(sign)
-        if limit is not None and len(times) >= limit:
+        if wanted.limit is not None and len(times) >= wanted.limit:
             break
     return Events(
         run.problem,
         integrator,
         function.name,
-        direction,
+        wanted.direction,
         POLYNOMIAL if function.rational else SAMPLED,
         *arrays(times, states, directions),
         run.until,

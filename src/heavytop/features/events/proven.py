@@ -32,6 +32,7 @@ from heavytop.exact.flint.balls import ball, midpoint, radius, whole_evaluation,
 from heavytop.exact.resolved import Resolved
 from heavytop.features.events.functions import (
     EventFunction,
+    Wanted,
     composed,
     first_term,
     in_body_axes,
@@ -189,34 +190,26 @@ class _Cell(NamedTuple):
 
 
 def proven_events(
-    solution: Validated,
-    until: Fraction,
-    function: EventFunction,
-    direction: int,
-    digits: int,
-    limit: int | None = None,
-    reached: Callable[[Fraction], None] | None = None,
-    resolved: Resolved | None = None,
+    solution: Validated, until: Fraction, wanted: Wanted, digits: int, resolved: Resolved | None = None
 ) -> list[ProvenEvent]:
     """The events in 0 < t < ``until`` (or until < t < 0), in the order of |t|, each to ``digits`` digits.
 
-    direction: 1 for those at which the function rises with time, −1 where it falls, 0 for all.
     resolved: where the function and the states are those of other axes, how ``solution`` was made; None for its own.
     Raises InputError where the function is zero along the motion, OutOfReach where the enclosure does not reach or
     cannot decide whether there is an event.
     """
-    wanted = ceil(digits * log2(10)) + _GUARD_BITS
+    bits = ceil(digits * log2(10)) + _GUARD_BITS
     axes = None if resolved is None or not resolved.is_rotated else resolved.axes
-    inner = function if axes is None else in_body_axes(function, axes)
-    order, sign = (0, 0) if solution.uncertainty is not None else _begins(solution, inner)
+    if axes is not None:
+        wanted = wanted._replace(function=in_body_axes(wanted.function, axes))
+    order, sign = (0, 0) if solution.uncertainty is not None else _begins(solution, wanted.function)
     undecided: _Undecided | None = None
     for attempt in range(_ATTEMPTS):
-        search = _Search(solution, inner, until, digits, order, sign, direction, limit, reached, axes)
         try:
-            return search.run(wanted)
+            return _Search(solution, until, wanted, digits, order, sign, axes).run(bits)
         except _Undecided as error:
             undecided = error
-            wanted += max(_EXTRA_BITS, wanted) if attempt else _EXTRA_BITS
+            bits += max(_EXTRA_BITS, bits) if attempt else _EXTRA_BITS
     assert undecided is not None
     raise OutOfReach(
         f"Near t = {decimal_text(undecided.time, 12)} it is not decided {undecided.cause}.",
@@ -239,14 +232,11 @@ class _Search:
     """One walk along the motion at one working precision."""
 
     solution: Validated
-    function: EventFunction
     until: Fraction
+    wanted: Wanted
     digits: int
     order: int
     sign: int
-    direction: int
-    limit: int | None
-    reached: Callable[[Fraction], None] | None
     axes: Any = None
     motion: Any = None
     terms: Any = None
@@ -255,7 +245,7 @@ class _Search:
     def run(self, bits: int) -> list[ProvenEvent]:
         """The events; raises _Undecided where ``bits`` bits are too few."""
         self.motion, steps = self.solution.walk(self.until, bits)
-        self.terms = _terms(self.function, self.solution, self.order)
+        self.terms = _terms(self.wanted.function, self.solution, self.order)
         pieces = self._pieces(steps)
         if self.sign:
             after = self.sign * (-1 if self.until < 0 and self.order % 2 else 1)
@@ -269,9 +259,9 @@ class _Search:
         for low, high in self._zeros(pieces, after):
             event = self._event(low, high, after)
             after = -after
-            if self.direction in (0, 1 if event.rising else -1):
+            if self.wanted.direction in (0, 1 if event.rising else -1):
                 events.append(event)
-                if self.limit is not None and len(events) >= self.limit:
+                if self.wanted.limit is not None and len(events) >= self.wanted.limit:
                     break
         return events
 
@@ -284,8 +274,8 @@ class _Search:
         for step in steps:
             piece = _piece(step, self.motion, self.terms, span)
             covered = step.node.time + step.length
-            if self.reached is not None:
-                self.reached(self._time(min(covered, span)))
+            if self.wanted.reached is not None:
+                self.wanted.reached(self._time(min(covered, span)))
             yield piece
         if covered < span:
             raise _Undecided(self._time(covered), "how the motion goes on: too many bits are lost")

@@ -21,7 +21,7 @@ from heavytop.features.claims.algebra.elliptic import FREE, JACOBI, WEIERSTRASS
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.functions import INVERSE, Refine, Transcendental
 from heavytop.features.claims.algebra.rational import Tower, forces_zero
-from heavytop.features.claims.algebra.ring import Quotient, Unprovable, used, where_provable
+from heavytop.features.claims.algebra.ring import Generator, Quotient, Unprovable, used, where_provable
 from heavytop.features.claims.algebra.signs import NUMBER_BITS, UNKNOWN, Sign
 from heavytop.features.claims.algebra.structure import Defined
 
@@ -136,13 +136,13 @@ class Field:
         floor = self.enter(bound)
         index = used(self.enter(symbol).numerator).pop()
         if floor.denominator == self.tower.one and self.tower.signs.can_have_form(index, floor.numerator):
-            excess = self.tower.add(f"{symbol} - ({bound})", constant=True, sign=1, strict=True)
+            excess = self.tower.add(Generator(f"{symbol} - ({bound})", constant=True, sign=1, strict=True))
             self.tower.signs.declare_form(index, floor.numerator + self.tower.gens[excess])
         else:
             self.tower.declare(self.enter(symbol - bound))
 
     def _add(self, meaning: sympy.Expr, *, constant: bool = True, sign: Sign, kind: str = "symbol") -> int:
-        index = self.tower.add(meaning, constant=constant, sign=sign.value, strict=sign.strict, kind=kind)
+        index = self.tower.add(Generator(meaning, constant, *sign, kind))
         self._known[meaning] = self.tower.polynomial(self.tower.gens[index])
         if meaning in self._ranges:
             self.tower.signs.ranges[index] = self._ranges[meaning]

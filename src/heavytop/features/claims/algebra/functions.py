@@ -17,7 +17,7 @@ from flint import fmpq_mpoly, fmpz
 from heavytop.features.claims.algebra.elliptic import FREE, WEIERSTRASS, cn, sn, wpinverse
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.rational import Tower
-from heavytop.features.claims.algebra.ring import Quotient, Unprovable, used
+from heavytop.features.claims.algebra.ring import Generator, Quotient, Unprovable, used
 from heavytop.features.claims.algebra.signs import NUMBER_BITS, PLUS, UNKNOWN, Sign
 
 
@@ -89,7 +89,7 @@ class Transcendental:
             meaning = sympy.exp(self._field.expression(base))
             index = self._new("exp", meaning, (base,), PLUS)
             if sign := self._tower.sign(base).value:  # it lies above or below 1
-                excess = self._tower.add(f"excess over 1 of x{index}", constant=False, sign=1)
+                excess = self._tower.add(Generator(f"excess over 1 of x{index}", constant=False, sign=1))
                 self._tower.signs.declare_form(index, self._tower.gens[excess] + 1, below_one=sign < 0)
             return index
 
@@ -273,7 +273,7 @@ class Transcendental:
     def _lowest_root(self, g2: Quotient, g3: Quotient) -> Quotient | None:
         """℘(ω3): the root e < 0 of 4x³ − g2 x − g3 with 12e² > g2, where it is a rational function of the symbols."""
         t = self._tower
-        index = t.add(f"root {len(t.generators)}", constant=True)
+        index = t.add(Generator(f"root {len(t.generators)}", constant=True))
         x = self._generator(index)
         for factor, _ in (4 * x**3 - g2 * x - g3).numerator.factor()[1]:
             parts = t.by_power(factor, index)
@@ -415,9 +415,7 @@ class Transcendental:
 
     def _new(self, kind: str, meaning: sympy.Expr, arguments: tuple[Quotient, ...], sign: Sign = UNKNOWN) -> int:
         constant = all(map(self._field.is_constant, arguments))
-        index = self._tower.add(
-            meaning, constant=constant, sign=sign.value, strict=sign.strict, kind=kind, arguments=arguments
-        )
+        index = self._tower.add(Generator(meaning, constant, *sign, kind, arguments))
         self._set_number(index, meaning)
         if kind in _MONOTONE:
             self._declare_order(index)

@@ -15,7 +15,7 @@ from typing import Any
 from flint import Ordering, fmpq, fmpq_mpoly, fmpz, fmpz_mpoly_ctx, fmpz_mpoly_vec
 
 from heavytop.exact.flint.balls import working_precision
-from heavytop.features.claims.algebra.ring import PolynomialRing, Quotient, Unprovable, used
+from heavytop.features.claims.algebra.ring import Generator, PolynomialRing, Quotient, Unprovable, used
 from heavytop.features.claims.algebra.signs import NUMBER_BITS, Sign, Signs
 
 # Nested square roots that are sums of simpler ones: √(3 + 2√2) = 1 + √2, √(a + √(a² − b²)) = (√(a + b) + √(a − b))/√2.
@@ -131,7 +131,7 @@ class Tower(PolynomialRing):
         constant = all(self.generators[i].constant for i in used(square))
         strict = kind == "root" and self.signs.of(square).strict
         argument = Quotient(square, self.one, self)
-        index = self.add(meaning, constant=constant, sign=sign, strict=strict, kind=kind, arguments=(argument,))
+        index = self.add(Generator(meaning, constant, sign, strict, kind, (argument,)))
         self.squares[index] = square
         number = self.signs.ball(square)
         if number is not None and kind == "root":

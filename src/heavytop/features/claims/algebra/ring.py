@@ -111,7 +111,7 @@ class Generator:
 
     meaning: Any
     constant: bool
-    sign: int
+    sign: int = 0
     strict: bool = False
     kind: str = "symbol"
     arguments: tuple[Quotient, ...] = ()
@@ -132,20 +132,11 @@ class PolynomialRing:
         # what has been divided by so far, by its text: nothing is proven where one of them is 0
         self.divisors: dict[str, fmpq_mpoly] = {}
 
-    def add(
-        self,
-        meaning: Any,
-        *,
-        constant: bool,
-        sign: int = 0,
-        strict: bool = False,
-        kind: str = "symbol",
-        arguments: tuple[Quotient, ...] = (),
-    ) -> int:
+    def add(self, generator: Generator) -> int:
         """The index of a new free generator."""
         if len(self.generators) == SLOTS:
             raise Unprovable(f"More than {SLOTS} independent quantities.", "Split the claim into smaller ones.")
-        self.generators.append(Generator(meaning, constant, sign, strict, kind, arguments))
+        self.generators.append(generator)
         return len(self.generators) - 1
 
     def relations(self) -> list[fmpq_mpoly]:

@@ -15,7 +15,7 @@ from flint import arb, fmpq, fmpq_mpoly
 
 from heavytop.exact.flint.balls import working_precision
 from heavytop.features.claims.algebra.combinations import nonnegative_combination
-from heavytop.features.claims.algebra.ring import PolynomialRing, Unprovable, used
+from heavytop.features.claims.algebra.ring import Generator, PolynomialRing, Unprovable, used
 
 NUMBER_BITS = 512
 """Working precision of the balls of generators that are numbers."""
@@ -434,7 +434,8 @@ class Signs:
 
     def _half_angle(self, sine: int) -> int:
         if sine not in self._half_angles:
-            self._half_angles[sine] = self._ring.add(f"tangent of half the angle of x{sine}", constant=False)
+            tangent = Generator(f"tangent of half the angle of x{sine}", constant=False)
+            self._half_angles[sine] = self._ring.add(tangent)
         return self._half_angles[sine]
 
     def _by_difference_from_facts(self, p: fmpq_mpoly) -> Sign:
