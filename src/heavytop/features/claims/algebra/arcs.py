@@ -9,6 +9,8 @@ the functions, or where it is continuous on a connected domain and less than π 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 from fractions import Fraction
 from math import gcd, prod
 
@@ -31,6 +33,7 @@ _MOST_TURNS = 12
 _SAMPLES = 3
 
 
+@dataclass(eq=False)
 class Arcs:
     """The relations between the inverse functions in a field over a region, found as they are asked for.
 
@@ -38,20 +41,13 @@ class Arcs:
     symbols in these generators go.
     """
 
-    def __init__(
-        self,
-        field: Field,
-        everywhere: Regularity,
-        points: Sequence[Point],
-        is_connected: Callable[[set[int]], bool],
-    ) -> None:
-        self._field = field
-        self._everywhere = everywhere
-        self._points = points
-        self._is_connected = is_connected
-        self._known = 0
-        self._free: list[int] = []
-        self._forms: dict[int, fmpq_mpoly] = {}
+    _field: Field
+    _everywhere: Regularity
+    _points: Sequence[Point]
+    _is_connected: Callable[[set[int]], bool]
+    _known: int = 0
+    _free: list[int] = dataclass_field(default_factory=list)
+    _forms: dict[int, fmpq_mpoly] = dataclass_field(default_factory=dict)
 
     def without(self, p: fmpq_mpoly) -> fmpq_mpoly:
         """A polynomial that is ``p`` all over the region, in fewer inverse functions."""

@@ -329,7 +329,7 @@ def of_arrays(
     require_states(times, rows)
     form = precision or written_numbers.of_bits(max(bits_of(value) for row in rows for value in row))
     states = [rounded_state([component(value) for value in row], form) for row in rows]
-    return _in_memory((name, integrator), top, start, which, form, times, states)
+    return GivenTrajectory(*_names(name, integrator), top, start, which, form, times, states, _outcome(states), 0, {})
 
 
 def require_states(times: list[Fraction], rows: list[Any]) -> None:
@@ -513,23 +513,17 @@ def of_observed_arrays(
     places = [f"row {i}" for i in range(len(times))]
     quantities, states = observed(body, raw, said, values, places, form, normalize)
     require_physical(quantities.posed.top, quantities.posed.start)
-    which = system_of(None, body)
-    return _in_memory(names, quantities.posed.top, quantities.posed.start, which, form, times, states, quantities)
+    top, start, which = quantities.posed.top, quantities.posed.start, system_of(None, body)
+    own = GivenTrajectory(*_names(*names), top, start, which, form, times, states, _outcome(states), 0, {})
+    return replace(own, observed=quantities)
 
 
-def _in_memory(
-    names: tuple[str, str],
-    top: HeavyTop,
-    start: State,
-    which: System,
-    form: Precision,
-    times: list[Fraction],
-    states: list[tuple[Fraction, ...] | None],
-    observed: Observed | None = None,
-) -> GivenTrajectory:
-    outcome = Outcome.NON_FINITE if None in states else Outcome.SUCCESS
-    name, integrator = named(names[0], "name"), named(names[1], "integrator")
-    return GivenTrajectory(name, integrator, top, start, which, form, times, states, outcome, 0, {}, observed=observed)
+def _names(name: str, integrator: str) -> tuple[str, str]:
+    return named(name, "name"), named(integrator, "integrator")
+
+
+def _outcome(states: Sequence[object]) -> Outcome:
+    return Outcome.NON_FINITE if None in states else Outcome.SUCCESS
 
 
 def _row(row: Sequence[Any], where: str) -> tuple[Fraction, ...] | None:
