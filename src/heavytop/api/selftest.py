@@ -14,7 +14,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from heavytop.api.faulty_integrators import FAULTS
+from heavytop.api.faulty_integrators import FAULTS, Fault
 from heavytop.errors import InputError
 from heavytop.features.kinds import KINDS
 from heavytop.harness.plan import expand, load
@@ -28,6 +28,7 @@ from heavytop.report.compare.rows import Finding
 from heavytop.report.compare.verdicts import Verdict
 
 CONTROL = "control"
+_HEALTHY = Fault("nothing; other roundings", detectable=False)
 _ALARMS = (Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING)
 _SHOWN = 3
 
@@ -79,14 +80,11 @@ def trial(name: str, comparison: Differences) -> Trial:
             quiet.append((finding.verdict is Verdict.BETTER, moved, f"{label} of {case}"))
     strongest = sorted(alarms.items(), key=lambda item: -max(item[1])[0])
     shift = max(quiet) if quiet and not alarms else None
-    if name == CONTROL:
-        about, detectable = "nothing; other roundings", False
-    else:
-        about, detectable = FAULTS[name].about, FAULTS[name].detectable
+    fault = FAULTS.get(name, _HEALTHY)
     return Trial(
         name,
-        about,
-        detectable,
+        fault.about,
+        fault.detectable,
         comparison.verdict,
         [(label, [case for _, case in cases]) for label, cases in strongest],
         None if shift is None else (shift[2], shift[1]),
@@ -120,13 +118,11 @@ def trials(tasks: Sequence[Task], workers: int, progress: Callable[[Task], None]
         progress(tasks[index])
     names = (CONTROL, *FAULTS)
     size = len(tasks) // (1 + len(names))
-    healthy, *others = ([rows_by_index[i] for i in range(at, at + size)] for at in range(0, len(tasks), size))
-    compared = (compare(_report(healthy), _report(other), Policy(), KINDS) for other in others)
+    healthy, *others = (
+        Report(SCHEMA, {}, {}, [rows_by_index[i] for i in range(at, at + size)]) for at in range(0, len(tasks), size)
+    )
+    compared = (compare(healthy, other, Policy(), KINDS) for other in others)
     return [trial(name, comparison) for name, comparison in zip(names, compared, strict=True)]
-
-
-def _report(measured: Sequence[Row]) -> Report:
-    return Report(SCHEMA, {}, {}, list(measured))
 
 
 def in_words(trials: Sequence[Trial]) -> RenderableType:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections import Counter, deque
+from collections import Counter, defaultdict, deque
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -64,23 +64,23 @@ class RowLimits:
     """
 
     fixed: float | None = None
-    _records: dict[str, _Record] = field(default_factory=dict)
+    _records: defaultdict[str, _Record] = field(default_factory=lambda: defaultdict(_Record))
 
     def seconds(self, task: Task, cost: float) -> float:
         """The limit of a row that begins now."""
         if self.fixed is not None:
             return self.fixed
-        record = self._of(task)
+        record = self._records[task.key.subject.name]
         return max((_BASE + _TIMES * cost * record.ratio) / (1 + record.lost), _LEAST)
 
     def finished(self, task: Task, cost: float, seconds: float) -> None:
         """A row ended by itself."""
-        record = self._of(task)
+        record = self._records[task.key.subject.name]
         record.lost, record.ratio = 0, max(record.ratio, seconds / cost)
 
     def ran_out(self, task: Task) -> None:
         """A row was stopped at its limit."""
-        record = self._of(task)
+        record = self._records[task.key.subject.name]
         record.lost, record.out_of_time = record.lost + 1, record.out_of_time + 1
 
     def not_asked(self, waiting: deque[int], tasks: Sequence[Task]) -> Iterator[tuple[int, Row]]:
@@ -103,9 +103,6 @@ class RowLimits:
             self.ran_out(task)
         elif task.is_third_party and row.outcome != FAILED:
             self.finished(task, cost, seconds)
-
-    def _of(self, task: Task) -> _Record:
-        return self._records.setdefault(task.key.subject.name, _Record())
 
 
 class _Worker:

@@ -107,18 +107,18 @@ def compare(
     rows = RowComparison(policy, kinds, timed, list_same, checked, repeated)
     others = _Others(candidate.rows)
     for row in baseline.rows:
-        match = others.take(row.identity)
+        match = others.take(identity := row.identity)
         if match is not None:
-            findings_by_row.append(changes.add(row, match, rows.compare(row, match)))
+            findings_by_row.append(changes.add(row, match, rows.compare(identity, row, match)))
             if folders is not None and not rows.ignores(row):
                 motions.append(kind_of(row, kinds).join(row, match, folders, partial(rows.limits, row)))
         elif not rows.ignores(row):
             missing.append((len(findings_by_row), row))
-            lacking = Finding(row.identity, "", Verdict.MISSING, row.outcome, None, "the row is missing")
+            lacking = Finding(identity, "", Verdict.MISSING, row.outcome, None, "the row is missing")
             findings_by_row.append([lacking])
     for index, row in missing:
         if (match := others.take_elsewhere(row.identity)) is not None:
-            findings_by_row[index] = rows.compare(row, match)[:1]
+            findings_by_row[index] = rows.compare(row.identity, row, match)[:1]
         changes.add(row, match, findings_by_row[index])
     for row in others.left():
         if not rows.ignores(row):

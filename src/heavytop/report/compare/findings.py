@@ -44,6 +44,7 @@ _LOWER_ORDER = (
 )
 _MOST_KEPT = 20_000
 """Rows whose numbers are held; further ones are counted, and named by their findings."""
+_ERROR = ERRORS[0].text
 _DIGITS = (SOLUTION_ERROR, ERRORS[0].name)
 """Quantities that the digits right sum up."""
 _WORDS = {
@@ -151,8 +152,9 @@ class Changes:
 
     def add(self, old: Row | None, new: Row | None, findings: list[Finding]) -> list[Finding]:
         """Take in the findings about one row, in one report or in both; returns them as they are."""
-        subject = None if old is None else old.key.subject
-        self._third_party |= subject is not None and subject.what == "computed" and is_third_party(subject.name)
+        if old is not None and not self._third_party:
+            subject = old.key.subject
+            self._third_party = subject.what == "computed" and is_third_party(subject.name)
         changed = [finding for finding in findings if finding.verdict is not Verdict.SAME]
         if changed:
             changed.sort(key=lambda finding: RANK.index(finding.verdict))
@@ -163,12 +165,13 @@ class Changes:
         return findings
 
     def _point(self, old: Row, new: Row) -> None:
-        errors = [row.metrics.get(ERRORS[0].text) for row in (old, new)]
-        logs = [metric.log10 for metric in errors if metric is not None and metric.log10 is not None]
-        if len(logs) == 2 and old.steps and new.steps:
+        before, after = old.metrics.get(_ERROR), new.metrics.get(_ERROR)
+        if before is None or after is None or before.log10 is None or after.log10 is None:
+            return
+        if old.steps and new.steps:
             steps = math.log10(old.steps), math.log10(new.steps)
             key = _curve(old.identity)
-            self.points.setdefault(key, []).append(SettingPoint(steps, (logs[0], logs[1])))
+            self.points.setdefault(key, []).append(SettingPoint(steps, (before.log10, after.log10)))
 
     def excused(self) -> Callable[[Finding], bool]:
         """Which findings are no verdict; their rows are taken out.
@@ -347,7 +350,7 @@ def _digits(row: Row | None) -> float | None:
         return None
     if (kept := digits_kept(row)) is not None:
         return kept
-    error = row.metrics.get(ERRORS[0].text)
+    error = row.metrics.get(_ERROR)
     return None if error is None or error.log10 is None else -error.log10
 
 
@@ -519,15 +522,12 @@ def _steps(change: Change) -> float:
 
 def _ends_as_before(change: Change) -> bool:
     """Whether of a computed row whose digits fell the last state is as right as it was: files do not say steps."""
-    computed = change.old is not None and change.old.key.subject.what == "computed"
-    moved = [] if change.old is None or not computed else [change.decades(name) for name in _finals(change.old)]
+    if change.old is None or change.old.key.subject.what != "computed":
+        return False
+    measured = ((name, metric.quantity) for name, metric in change.old.metrics.items())
+    finals = [name for name, q in measured if q and q.name in _DIGITS and q.statistic == "final"]
+    moved = [change.decades(name) for name in finals]
     return bool(moved) and all(error is not None and error < _ENDS_AS_BEFORE for error in moved)
-
-
-def _finals(row: Row) -> list[str]:
-    """The metrics of the error at the last sample."""
-    pairs = ((name, metric.quantity) for name, metric in row.metrics.items())
-    return [name for name, q in pairs if q and q.name in _DIGITS and q.statistic == "final"]
 
 
 def _laws_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:

@@ -329,10 +329,10 @@ class RowComparison:
         """The limits of a metric of a row."""
         return self.lookup(row.key.kind, row.case, metric)
 
-    def compare(self, old: Row, new: Row) -> list[Finding]:
-        """All findings about a row that both reports have."""
+    def compare(self, key: Identity, old: Row, new: Row) -> list[Finding]:
+        """All findings about a row that both reports have.  key: of the baseline's."""
         versions = old.key.subject.version, new.key.subject.version
-        key = old.identity._replace(versions=versions) if all(versions) else old.identity
+        key = key._replace(versions=versions) if all(versions) else key
         if UNSUPPORTED in (old.outcome, new.outcome) and (verdict := _support(old, new)) is not None:
             return [] if self.ignores(old) else self._whole(key, old, new, *verdict)
         if (judged := self._outcomes(old, new)) is not None:
@@ -398,7 +398,12 @@ class RowComparison:
                     findings.append(Finding(key, name, Verdict.MISSING, metric.value, None, "the metric is missing"))
                     continue
                 verdict, why = self._metric(metric, match, limits, old, new)
-                slight = verdict is Verdict.WORSE and self._is_slight(metric, match, limits, old, new)
+                slight = (  # a loss of truncation alone
+                    verdict is Verdict.WORSE
+                    and limits.truncation < size(match) - size(metric) <= limits.loss
+                    and beyond_limit(match, limits) is None
+                    and self._is_truncation(metric, match, old, new)
+                )
                 findings.append(Finding(key, name, verdict, metric.value, match.value, why, slight=slight))
         if new.metrics.keys() != old.metrics.keys():
             findings += [
@@ -619,12 +624,6 @@ class RowComparison:
         if self._bound is None or self._bound.row is not row:
             self._bound = RoundingBound(row, kind_of(row, self.kinds))
         return self._bound
-
-    def _is_slight(self, metric: Metric, match: Metric, limits: Limits, old: Row, new: Row) -> bool:
-        """Whether a loss counts as one of truncation alone."""
-        lost = size(match) - size(metric)
-        allowed = lost <= limits.loss and beyond_limit(match, limits) is None
-        return allowed and lost > limits.truncation and self._is_truncation(metric, match, old, new)
 
     def _noise(self, metrics: dict[str, list[Metric]], row: Row, limits: Limits) -> float:
         """Decades by which noise may move what a series or a law is about: as the metrics that sum it up."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import shlex
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, pairwise
 from pathlib import Path
@@ -134,20 +134,13 @@ class MotionTable:
 
 def of_motion(motion: Motion, command: str, version: str) -> MotionTable:
     """The table of a computed motion: states, ξ and Euler angles where asked for, outputs."""
-    run = motion.trajectory
-    columns, parts = _states(), [motion.states]
+    columns, parts, document = _states(), [motion.states], motion.to_json()
     if motion.attitude is not None and motion.angles is not None:
         columns = (*columns, *_xi(), *(Column(name, mark, _GREEK[mark]) for name, mark in _ANGLES))
         parts += [motion.attitude, motion.angles]
-    for output in motion.outputs:
-        columns = (*columns, *_columns_of(output))
-        parts.append([list(_flat(value)) for value in motion.output_texts(output)])
-    document = motion.to_json()
-    facts = [*_made_by(command, version), *_data_of(document), ("system", run.problem.system.name)]
-    facts += [(key, str(document[key])) for key in _KNOWN]
-    lines = [list(chain(*line)) for line in zip(*parts, strict=True)]
-    values = tuple(tuple((value, None) for value in line) for line in lines)
-    return MotionTable((*facts, *_outputs_of(motion.outputs)), columns, tuple(motion.written_times), values)
+    facts = [("system", motion.trajectory.problem.system.name), *((key, str(document[key])) for key in _KNOWN)]
+    data = [*_made_by(command, version), *_data_of(document), *facts]
+    return _table(data, columns, parts, motion.outputs, motion.output_texts, motion.written_times)
 
 
 def of_reference(reference: Reference, outputs: Sequence[Output], command: str, version: str) -> MotionTable:
@@ -155,17 +148,28 @@ def of_reference(reference: Reference, outputs: Sequence[Output], command: str, 
     columns, parts = _states(), [reference.states]
     if reference.attitude is not None:
         columns, parts = (*columns, *_xi()), [*parts, reference.attitude]
-    for output in outputs:
-        columns = (*columns, *_columns_of(output))
-        parts.append([list(_flat(value)) for value in reference.balls(output)])
     facts = [*_made_by(command, version), *_data_of(msgspec.to_builtins(reference)), ("system", reference.system)]
     facts += [("precision", _wide_format(reference)), ("digits", str(reference.digits)), ("method", reference.method)]
     facts.append(("source", reference.source))
     if reference.attitude_method not in (None, reference.method):
         facts.append(("method of the attitude", str(reference.attitude_method)))
-    lines = [list(chain(*line)) for line in zip(*parts, strict=True)]
-    values = tuple(tuple((ball.value, ball.radius) for ball in line) for line in lines)
-    return MotionTable((*facts, *_outputs_of(outputs)), columns, tuple(map(str, reference.times)), values)
+    return _table(facts, columns, parts, outputs, reference.balls, list(map(str, reference.times)))
+
+
+def _table(
+    facts: Sequence[tuple[str, str]],
+    columns: tuple[Column, ...],
+    parts: Sequence[Sequence[Sequence[Any]]],
+    outputs: Sequence[Output],
+    of_output: Callable[[Output], list[Any]],
+    times: Sequence[str],
+) -> MotionTable:
+    """The table of some parts of a motion, each a line a time, and of its outputs; numbers are texts or balls."""
+    columns = (*columns, *(column for output in outputs for column in _columns_of(output)))
+    parts = [*parts, *([_flat(value) for value in of_output(output)] for output in outputs)]
+    lines = (chain(*line) for line in zip(*parts, strict=True))
+    values = tuple(tuple((n, None) if isinstance(n, str) else (n.value, n.radius) for n in line) for line in lines)
+    return MotionTable((*facts, *_outputs_of(outputs)), columns, tuple(times), values)
 
 
 _ANGLES = (("phi", "φ"), ("theta", "θ"), ("psi", "ψ"))
