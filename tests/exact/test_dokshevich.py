@@ -97,8 +97,7 @@ def test_momentum_is_level_and_its_share_along_r_is_not_0():
 def test_a_turning_point_is_a_start_like_any_other():
     case = Dokshevich(*motion(1))
     assert case.start.omega[1] == 0
-    assert_solves(case, F(0))
-    assert_solves(case, F(-1000))
+    assert_solves(case, F(0), F(-1000))
 
 
 @pytest.mark.slow

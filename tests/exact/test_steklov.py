@@ -42,8 +42,7 @@ def turning(second, ratio, rate):
 def test_turning_points_are_starts_like_any_other(data):
     top, start = turning(*data)
     motion = Steklov(top, start)
-    assert_solves(motion, F(7, 3))
-    assert_solves(motion, F(-1000))
+    assert_solves(motion, F(7, 3), F(-1000))
 
 
 @pytest.mark.parametrize("distance", [F(1, 10), F(1, 1000)])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from fractions import Fraction
+from itertools import chain
 
 from flint import arb
 
@@ -29,35 +30,36 @@ def residual(solution, time, bits=DIGITS_60):
         return [(y.derivative() - f)[k] for y, f in zip(series, field, strict=True) for k in range(2)]
 
 
-def assert_solves(solution, time):
+def assert_solves(solution, *times):
     """The residual of all six equations contains 0 with radius below 1e-40 at 60 digits; t = 0 gives the start."""
-    for value in residual(solution, time):
+    for value in chain(*(residual(solution, time) for time in times)):
         assert value.contains(0), value
         assert value.rad() < arb("1e-40")
     for value, exact in zip(solution.state(Fraction(0), DIGITS_60), solution.start.flat, strict=True):
         assert abs(midpoint(value) - exact) <= 2 * radius(value) + Fraction(1, 10**70) * abs(exact)
 
 
-def assert_attitude(solution, time, step=Fraction(1, 10**12)):
+def assert_attitude(solution, *times, step=Fraction(1, 10**12)):
     """ξ is a unit vector across γ that turns with the body: a difference quotient against ξ × ω."""
     bits = DIGITS_60
-    xi, later, earlier = (solution.attitude(t, bits) for t in (time, time + step, time - step))
-    state = solution.state(time, bits)
-    with working_precision(2 * bits):
-        omega = solution.system.angular_velocity(parameters(solution), state)
-        one = sum(x * x for x in xi)
-        across = sum(x * g for x, g in zip(xi, state[3:], strict=True))
-        assert abs(one - 1).abs_upper() < arb("1e-55")
-        assert across.abs_upper() < arb("1e-50")
-        wanted = (
-            xi[1] * omega[2] - xi[2] * omega[1],
-            xi[2] * omega[0] - xi[0] * omega[2],
-            xi[0] * omega[1] - xi[1] * omega[0],
-        )
-        size = (1 + sum(abs(w) for w in omega) + sum(abs(s) for s in state)) ** 3
-        for a, b, w in zip(later, earlier, wanted, strict=True):
-            # the error of the central difference is step²/6 times a third derivative
-            assert abs((a - b) / (2 * ball(step)) - w).abs_upper() < size.abs_upper() ** 2 * arb("1e-20")
+    for time in times:
+        xi, later, earlier = (solution.attitude(t, bits) for t in (time, time + step, time - step))
+        state = solution.state(time, bits)
+        with working_precision(2 * bits):
+            omega = solution.system.angular_velocity(parameters(solution), state)
+            one = sum(x * x for x in xi)
+            across = sum(x * g for x, g in zip(xi, state[3:], strict=True))
+            assert abs(one - 1).abs_upper() < arb("1e-55")
+            assert across.abs_upper() < arb("1e-50")
+            wanted = (
+                xi[1] * omega[2] - xi[2] * omega[1],
+                xi[2] * omega[0] - xi[0] * omega[2],
+                xi[0] * omega[1] - xi[1] * omega[0],
+            )
+            size = (1 + sum(abs(w) for w in omega) + sum(abs(s) for s in state)) ** 3
+            for a, b, w in zip(later, earlier, wanted, strict=True):
+                # the error of the central difference is step²/6 times a third derivative
+                assert abs((a - b) / (2 * ball(step)) - w).abs_upper() < size.abs_upper() ** 2 * arb("1e-20")
 
 
 def attitude_of(solution, latest, bits):
@@ -75,6 +77,13 @@ def assert_meets(solution, times, bits=170):
         with working_precision(2 * bits):
             assert all(a.overlaps(b) for a, b in pairs)
             assert max(abs(a - b).upper() for a, b in pairs) < arb("1e-40")
+
+
+def assert_every_digit(solution, *times):
+    """It solves the equations at these times, and the digits asked for come out."""
+    for time in times:
+        assert_solves(solution, time)
+        assert_narrow(solution, time)
 
 
 def assert_narrow(solution, time, digits=50):
