@@ -24,6 +24,7 @@ from heavytop.report.compare import noise
 from heavytop.report.render.terminal import brief
 from support import audits, from_a_wheel, in_process
 from support.documents import PAGES, ROOT, Block, blocks, folder_like_a_checkout, run_shell
+from support.helpers import named_peers
 
 NOT_CODE = {
     "text",
@@ -171,12 +172,8 @@ def read_toml(text: str, folder: Path) -> None:
     if "measure" in content:
         assert list(plan.expand(plan.load(str(file), KINDS)[0]))
     elif "project" in content:
-        info = folder / "block-1.0.dist-info"
-        info.mkdir()
-        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: block\nVersion: 1.0\n")
         points = content["project"]["entry-points"]["heavytop.peers"]
-        lines = [f"{key} = {value}" for key, value in points.items()]
-        (info / "entry_points.txt").write_text("\n".join(["[heavytop.peers]", *lines]))
+        named_peers(folder, {}, *(f"{key} = {value}" for key, value in points.items()))
     elif "integrator" in content:
         assert commands_in(file)
     elif "kind" in content:

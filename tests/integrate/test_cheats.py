@@ -6,7 +6,6 @@ in tests/harness/test_limited.py.
 
 from __future__ import annotations
 
-import importlib
 from pathlib import Path
 from time import perf_counter
 
@@ -19,6 +18,7 @@ from heavytop.harness.checkpoint import Saved
 from heavytop.harness.rows import measure
 from heavytop.measure.integrator import Repeats
 from heavytop.records import Row
+from support.helpers import named_peers
 from support.reports import expand, load
 
 MODULE = '''
@@ -253,13 +253,8 @@ STEPPED = ("fixed", "fixed_few", "fixed_many")
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Another package with all of them."""
     (tmp_path / "cheats.py").write_text(MODULE)
-    info = tmp_path / "cheats-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: cheats\nVersion: 1.0\n")
-    lines = [f"mine:{name} = cheats:{name}" for name in {*CHEATS, *DOUBTED, *TIMED, *STEPPED}]
-    (info / "entry_points.txt").write_text("[heavytop.peers]\n" + "\n".join(lines))
+    named_peers(tmp_path, {name: f"cheats:{name}" for name in (*CHEATS, *DOUBTED, *TIMED, *STEPPED)})
     monkeypatch.syspath_prepend(tmp_path)
-    importlib.invalidate_caches()
     monkeypatch.setattr(work_precision, "_USUAL", Repeats(3, 3, 0.0))
     return tmp_path
 

@@ -1,6 +1,5 @@
 """Whatever a third-party integrator does, its row says so and the others go on."""
 
-import importlib
 import json
 import signal
 import subprocess
@@ -22,7 +21,7 @@ from heavytop.precision import DOUBLE, QUAD
 from heavytop.records import Report
 from heavytop.report.compare.noise import Policy
 from heavytop.report.render.export import comparison_junit
-from support.helpers import run_peer, without_progress
+from support.helpers import named_peers, run_peer, without_progress
 from support.reports import all_good, compare, expand, html, load, measure, plan_of
 
 CASE = CASES["euler"]
@@ -219,14 +218,9 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Another package with one peer of every kind."""
     (tmp_path / "others.py").write_text(MODULE)
     (tmp_path / "others_broken.py").write_text("print('hello')\nimport sys\nsys.exit(3)")
-    info = tmp_path / "others-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: others\nVersion: 1.0\n")
-    lines = [f"mine:{name} = others:{name}" for name in (*FAILURES, *HARMLESS, "dies")]
-    lines += ["mine:exits = others_broken:x", "mine:absent = nowhere:x", "mine:lacks = others:not_there"]
-    (info / "entry_points.txt").write_text("[heavytop.peers]\n" + "\n".join(lines))
+    peers = {name: f"others:{name}" for name in (*FAILURES, *HARMLESS, "dies")}
+    named_peers(tmp_path, peers | {"exits": "others_broken:x", "absent": "nowhere:x", "lacks": "others:not_there"})
     monkeypatch.syspath_prepend(tmp_path)
-    importlib.invalidate_caches()
     monkeypatch.setattr(work_precision, "_USUAL", Repeats(1, 1, 0.0))
     return tmp_path
 

@@ -1,6 +1,5 @@
 """Other integrators behind the same call: they agree with heyoka, from whose code they take nothing."""
 
-import importlib
 import subprocess
 import sys
 from dataclasses import replace
@@ -20,7 +19,7 @@ from heavytop.integrate.peers.mpmath_taylor import odefun
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import DOUBLE, QUAD, real
 from heavytop.top.equations import HEAVY_TOP
-from support.helpers import distance, run_peer
+from support.helpers import distance, named_peers, run_peer
 
 TIMES = [Fraction(1, 3), Fraction(2), Fraction(5)]
 FINE = Fraction(1, 10**12)
@@ -120,15 +119,9 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Another package with the peer of the example, and with bad ones."""
     (tmp_path / "adapter_of_docs.py").write_text(EXAMPLE + "\nnot_callable = 3\n")
     (tmp_path / "broken.py").write_text("raise RuntimeError('no licence')")
-    info = tmp_path / "mine-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(
-        "[heavytop.peers]\nmine:rk4 = adapter_of_docs:rk4\nmine:broken = broken:x\nmine:absent = nowhere:x\n"
-        "mine:three = adapter_of_docs:not_callable\nheyoka = adapter_of_docs:rk4\n"
-    )
+    peers = {"rk4": "adapter_of_docs:rk4", "broken": "broken:x", "absent": "nowhere:x"}
+    named_peers(tmp_path, peers | {"three": "adapter_of_docs:not_callable"}, "heyoka = adapter_of_docs:rk4")
     monkeypatch.syspath_prepend(tmp_path)
-    importlib.invalidate_caches()
 
 
 @pytest.mark.usefixtures("package")

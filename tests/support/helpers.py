@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from pathlib import Path
 from random import Random
@@ -66,3 +66,12 @@ def without_progress(errors: str) -> str:
 def rotor(system: System, draw: Callable[[], Fraction]) -> Any:
     """λ, or k in its place for the heavy gyrostat."""
     return (draw(), draw(), draw()) if system is HEAVY_GYROSTAT else draw()
+
+
+def named_peers(folder: Path, peers: Mapping[str, str], *lines: str) -> None:
+    """The metadata of an installed package whose entry points are these integrators, ``mine:`` before their names."""
+    info = folder / "mine-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")
+    named = (f"mine:{name} = {target}" for name, target in peers.items())
+    (info / "entry_points.txt").write_text("\n".join(["[heavytop.peers]", *named, *lines]))
