@@ -71,7 +71,11 @@ def test_files_are_scored_in_parallel_and_a_bad_one_does_not_stop_the_others(tmp
     assert order["order"] == pytest.approx(2, abs=0.01)
 
 
-def test_a_page_is_of_one_trajectory() -> None:
-    done = heavytop("score", "a.csv", "b.csv", "--html", "page.html")
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [(("b.csv", "--html", "page.html"), "one trajectory; got 2"), (("-",), "Standard input is one trajectory")],
+)
+def test_a_page_and_standard_input_are_of_one_trajectory(words: tuple[str, ...], said: str) -> None:
+    done = heavytop("score", "a.csv", *words)
     assert done.returncode == ExitCode.BAD_INPUT
-    assert "one trajectory; got 2" in done.stderr
+    assert said in done.stderr
