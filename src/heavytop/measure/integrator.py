@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from statistics import median
@@ -327,19 +327,6 @@ def complete(
         integrator.propagate_many(todo, times, observe, finished, **options)
 
 
-@dataclass(frozen=True, slots=True)
-class _Measured:
-    """An error over the ensemble: an :class:`Ensemble`, but for the step.
-
-    values: shape (starts, samples).  sizes: of the quantity itself, shape (starts,).
-    """
-
-    values: Array
-    sizes: Array
-    accumulates: int
-    resolution: Array | float = 0.0
-
-
 @dataclass(slots=True)
 class Growing:
     """The results of an ensemble: metrics, each a root mean square over the starts, series and their laws."""
@@ -364,44 +351,44 @@ def growing(
     """
     steps = sum(motion.steps for motion in motions) / len(motions)
     step = float(times[-1]) / steps if steps else 0.0
-    results = Growing({}, {}, {})
-    quantities = _drifts(scorers, len(times), motions)
-    known = any(scorer.error for scorer in scorers) and reference.samples
-    if known:
-        quantities |= _errors(starts, motions, reference, distance)
-    for quantity, measured in quantities.items():
-        _add(results, quantity, measured, times[: measured.values.shape[1]], step, time_text)
-    if known:
+    results, moments = Growing({}, {}, {}), numpy.array([float(abs(time)) for time in times])
+
+    def add(quantity: Quantity, sizes: Array, samples: int, accumulates: int, blur: Array | float = 0.0) -> None:
+        """Take in a quantity.  sizes: of it in each motion, shape (starts,)."""
+        values = _values(quantity, samples, motions)
+        ensemble = Ensemble(moments[:samples], values, step, resolution=blur, accumulates=accumulates)
+        if ensemble.healthy.any():
+            ensemble = replace(ensemble, size=float(root_mean_square(sizes[ensemble.healthy])) or 1.0)
+        _add(results, quantity, ensemble, list(map(time_text, times[:samples])))
+
+    for quantity in scorers[0].drift.quantities():
+        initial = numpy.array([float(scorer.drift.initial[quantity.component]) for scorer in scorers])
+        add(quantity, initial, len(times), 1)
+    if any(scorer.error for scorer in scorers) and reference.samples:
+        blur = numpy.array(reference.blur)
+        for quantity, sizes, accumulates in _errors(starts, motions, distance):
+            add(quantity, sizes, reference.samples, accumulates, blur)
         values = _values(RELATIVE.over(""), reference.samples, motions)
         # over the starts that reached the end, of the largest of their values
         results.metrics[RELATIVE] = _metric(values[numpy.isfinite(values).all(axis=1)].max(axis=1), True)
     return results
 
 
-def _drifts(scorers: Sequence[Scorer], samples: int, motions: Sequence[Ended]) -> dict[Quantity, _Measured]:
-    drifts = {}
-    for quantity in scorers[0].drift.quantities():
-        sizes = numpy.array([float(scorer.drift.initial[quantity.component]) for scorer in scorers])
-        drifts[quantity] = _Measured(_values(quantity, samples, motions), sizes, 1)
-    return drifts
-
-
 def _errors(
-    starts: Sequence[State], motions: Sequence[Ended], reference: EnsembleReference, distance: float
-) -> dict[Quantity, _Measured]:
-    """The error of Ω and γ, of its parts, and of attitude and position where every motion has them."""
+    starts: Sequence[State], motions: Sequence[Ended], distance: float
+) -> Iterator[tuple[Quantity, Array, int]]:
+    """The error of Ω and γ, of its parts, and of attitude and position where every motion has them: size in each
+    motion, and how it accumulates.
+    """
     omega = numpy.linalg.norm([[float(w) for w in start.omega] for start in starts], axis=1)
     one = numpy.ones(len(starts))
     state_sizes = numpy.hypot(omega, one)
     sizes = {"along": state_sizes, "across": state_sizes, "omega": omega, "gamma": one}
-    blur, errors = numpy.array(reference.blur), {}
     for part, accumulates in _ACCUMULATES.items():
-        quantity = Quantity(SOLUTION_ERROR, part)
-        errors[quantity] = _Measured(_values(quantity, reference.samples, motions), sizes[part], accumulates, blur)
+        yield Quantity(SOLUTION_ERROR, part), sizes[part], accumulates
     for quantity, size in ((ATTITUDE, one), (POSITION, distance * one)):
         if all(quantity.text in motion.values for motion in motions):
-            errors[quantity] = _Measured(_values(quantity, reference.samples, motions), size, 2, blur)
-    return errors
+            yield quantity, size, 2
 
 
 def _values(quantity: Quantity, samples: int, motions: Sequence[Ended]) -> Array:
@@ -413,29 +400,12 @@ def _values(quantity: Quantity, samples: int, motions: Sequence[Ended]) -> Array
     return errors
 
 
-def _add(
-    growing: Growing,
-    quantity: Quantity,
-    measured: _Measured,
-    times: Sequence[Fraction],
-    step: float,
-    time_text: TimeText,
-) -> None:
+def _add(growing: Growing, quantity: Quantity, ensemble: Ensemble, times: list[str]) -> None:
     """RMS over starts of the largest and of the final value, the RMS over time, and its law."""
-    ensemble = Ensemble(
-        numpy.array([float(abs(time)) for time in times]),
-        measured.values,
-        step,
-        resolution=measured.resolution,
-        accumulates=measured.accumulates,
-    )
-    kept = measured.values[ensemble.healthy]
-    if len(kept):
-        size = float(root_mean_square(measured.sizes[ensemble.healthy]))
-        ensemble = replace(ensemble, size=size or 1.0)
+    kept = ensemble.errors[ensemble.healthy]
     rms, name = ensemble.rms(), quantity.text
     texts = [_text(value, len(kept) > 0) for value in rms]
-    growing.series[name] = Series([time_text(time) for time in times], texts, quantity)
+    growing.series[name] = Series(times, texts, quantity)
     for part, values in (("max", kept.max(axis=1)), ("final", kept[:, -1])):
         resolved = len(kept) > 0 and not (part == "final" and numpy.isnan(rms[-1]))
         growing.metrics[quantity.over(part)] = _metric(values, resolved)
