@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache, partial, wraps
+from importlib.util import find_spec
 from threading import RLock
 from time import perf_counter
 from typing import Any, Literal, TypeVar
@@ -159,7 +160,7 @@ def double_peer(
         seconds = {"compile": solved.compile, "run": perf_counter() - began - solved.compile}
         flags = {
             control: solved.tolerance or repr(request.control),
-            "field": "python" if compiler().__module__ == __name__ else "numba",
+            "field": "numba" if find_spec("numba") else "python",  # not loaded where nobody needs it
         }
         return _judged(problem, name, order, request, solved, seconds, flags)
 
