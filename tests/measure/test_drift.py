@@ -1,22 +1,31 @@
 """Drift and distance: evaluated with guard bits, never a number where there is none."""
 
+from contextlib import suppress
+from decimal import Decimal
 from fractions import Fraction
+from functools import partial
+from operator import add, mul, sub, truediv
+from random import Random
 
 import numpy
 import pytest
 from flint import arb
 
-from heavytop.cases import case
+from heavytop.cases import CASES, case
+from heavytop.errors import InputError
 from heavytop.exact.cases.delone import DeloneHomoclinic
 from heavytop.exact.flint.balls import ball, working_precision
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Problem
-from heavytop.measure.scalar import metric, of_fraction, root, text, to_ball
+from heavytop.measure import scorer as scoring
+from heavytop.measure.scalar import metric, of_fraction, root, text, to_ball, to_balls
 from heavytop.measure.scorer import Drift, Rough, Scorer, SolutionError, split
 from heavytop.measure.truth import Truth, closed_form
+from heavytop.multiword.pairs import Pairs
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, exact, number, real
 from heavytop.records import Against
-from heavytop.top.equations import holding
+from heavytop.top.equations import SYSTEMS, Parameters, holding, kovalevskaya_yehia
+from heavytop.top.equations import sretensky as sretensky_integral
 from heavytop.top.heavy_top import HeavyTop, State
 
 TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
@@ -89,6 +98,138 @@ def test_a_nan_is_never_a_number() -> None:
     drift(Fraction(2), numpy.array([float(v) for v in START.flat]))
     assert drift.metrics()["drift_energy_max"].value == "nan"
     assert drift.metrics()["drift_energy_rms"].value == "nan"
+
+
+def near_the_start(problem: Problem, count: int, random: Random) -> numpy.ndarray:
+    """States that a few roundings have moved, in the numbers of the format."""
+    start, rows = problem.start, []
+    units = [problem.precision.eps * max(map(abs, part)) for part in (start.omega, start.gamma) for _ in range(3)]
+    for _ in range(count):
+        moved = [value + unit * random.randint(-8, 8) for value, unit in zip(start.flat, units, strict=True)]
+        rows.append([number(value, problem.precision) for value in moved])
+    return numpy.array(rows)
+
+
+def balls_counted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    counted: list[int] = []
+    monkeypatch.setattr(scoring, "to_balls", lambda state: counted.append(1) or to_balls(state))
+    return counted
+
+
+@pytest.mark.parametrize("precision", [DOUBLE, EXTENDED], ids=lambda p: p.name)
+@pytest.mark.parametrize("scale", [1, 10**4, Fraction(1, 10**4), 10**15, Fraction(1, 10**15)])
+def test_many_states_at_once_have_the_drift_of_exact_fractions(monkeypatch, precision, scale: Fraction) -> None:
+    """All digits of all numbers, and by arrays: in units of time from 1e-15 to 1e15."""
+    random = Random(f"{precision} {scale}")
+    problem = Problem.of(
+        HeavyTop(TOP.inertia, TOP.weight * scale**2, TOP.centre),
+        State([w * scale for w in START.omega], START.gamma),
+        precision,
+    )
+    rows = near_the_start(problem, 300, random)
+    counted, drift = balls_counted(monkeypatch), Drift(problem, problem.integrals())
+    drift.take_array(rows)
+    metrics = drift.metrics()
+    assert len(counted) < 30
+    start, exact_rows = problem.start.flat, [[exact(value) for value in row] for row in rows]
+    for integral in problem.integrals():
+        first = integral.value(problem.parameters, start)
+        offs = [abs(integral.value(problem.parameters, row) - first) for row in exact_rows]
+        expected = {"max": max(offs) ** 2, "rms": sum(off**2 for off in offs) / 300, "final": offs[-1] ** 2}
+        for part, square in expected.items():
+            text = Decimal(metrics[f"drift_{integral.name}_{part}"].value)
+            half = Fraction(Decimal((0, (5,), text.adjusted() - 8))) + abs(first) / 2 ** (problem.precision.bits + 59)
+            assert (Fraction(text) - half) ** 2 <= square <= (Fraction(text) + half) ** 2
+
+
+@pytest.mark.parametrize("exponent", [-100, -80, -36, -21, -19, 19, 20, 36, 100])
+def test_at_odd_scales_numbers_are_those_of_balls(monkeypatch, exponent: int) -> None:
+    """Where words overflow or underflow, just beyond and far, balls are evaluated of each state."""
+    scale = Fraction(10) ** exponent
+    top = HeavyTop(TOP.inertia, TOP.weight * scale**2, TOP.centre)
+    problem = Problem.of(top, State([w * scale for w in START.omega], START.gamma), DOUBLE)
+    rows = near_the_start(problem, 40, Random(exponent))
+    one_by_one = Drift(problem, problem.integrals(), [Fraction(-1)])
+    for row in rows:
+        one_by_one(Fraction(1), row)
+    drift, counted = Drift(problem, problem.integrals()), balls_counted(monkeypatch)
+    drift.take_array(rows)
+    assert drift.metrics() == one_by_one.metrics()
+    assert (len(counted) == 40) == (not -20 < exponent < 20)
+
+
+class Depth:
+    """How many operations a term of an expression goes through at most: those of both factors, of one summand."""
+
+    def __init__(self, count: int = 0) -> None:
+        self.count = count
+
+    def __add__(self, other: object) -> "Depth":
+        return Depth(1 + max(self.count, getattr(other, "count", 0)))
+
+    def __mul__(self, other: object) -> "Depth":
+        return Depth(1 + self.count + getattr(other, "count", 0))
+
+    __sub__ = __add__
+    __truediv__ = __mul__
+
+
+def test_no_term_of_an_integral_goes_through_more_than_sixteen_operations() -> None:
+    seen = set()
+    for body in CASES.values():
+        for system in SYSTEMS:
+            with suppress(InputError):
+                parameters = system.parameters(body.top, body.start).mapped(lambda _: Depth())
+                for integral in holding(body.top, body.start, system):
+                    seen.add(integral.name.rstrip("123"))
+                    assert integral.value(parameters, [Depth()] * 6).count <= 16
+    yehia, sretensky = (partial(value, axes=(0, 1, 2)) for value in (kovalevskaya_yehia, sretensky_integral))
+    parameters = Parameters((Depth(),) * 3, (Depth(),) * 3, (Depth(),) * 3)
+    assert max(value(parameters, [Depth()] * 6).count for value in (yehia, sretensky)) <= 16
+    assert {"energy", "kovalevskaya", "goryachev_chaplygin", "hess", "gyrostat_energy", "spin"} <= seen
+
+
+@pytest.mark.parametrize("operation", [add, sub, mul, truediv], ids=lambda operation: operation.__name__)
+def test_an_operation_on_double_doubles_is_off_by_sixteen_squares_of_a_rounding(operation) -> None:
+    """Of the sum of its absolute terms, so that cancellation counts for nothing; exact fractions at random."""
+    random = Random(operation.__name__)
+    numbers = [
+        [Fraction(random.randint(-(2**120), 2**120), 2 ** random.choice((118, 119, 121, 170))) for _ in range(3000)]
+        for _ in range(2)
+    ]
+    pairs = [Pairs.nearest(values) for values in numbers]
+    exacts = [list(map(add, map(Fraction, pair.high.tolist()), map(Fraction, pair.low.tolist()))) for pair in pairs]
+    result = operation(*pairs)
+    for high, low, one, other in zip(result.high.tolist(), result.low.tolist(), *exacts, strict=True):
+        scale = abs(one) + abs(other) if operation in (add, sub) else abs(operation(one, other))
+        assert abs(Fraction(high) + Fraction(low) - operation(one, other)) <= 16 * scale / 2**106
+
+
+def test_a_drift_that_doubles_do_not_resolve_is_evaluated_in_balls(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a state that comes back to the start, and of one whose component is not finite."""
+    problem = Problem.of(TOP, START, DOUBLE)
+    rows = numpy.array([[float(value) for value in problem.start.flat]] * 40)
+    same, broken = Drift(problem, problem.integrals()), Drift(problem, problem.integrals())
+    same.take_array(rows)
+    assert {metric.value for metric in same.metrics().values()} <= {"0", "unresolved"}
+    rows[7, 2] = numpy.nan
+    broken.take_array(rows)
+    assert broken.metrics()["drift_energy_rms"].value == "nan"
+    assert broken.metrics()["drift_energy_final"].value in ("0", "unresolved")
+
+
+def test_states_that_wait_are_counted_before_anything_is_told() -> None:
+    """Also where arrays and lists take turns, and more come than wait."""
+    problem = Problem.of(TOP, START, DOUBLE)
+    rows = near_the_start(problem, 2100, Random(1))
+    drift, one_by_one = Drift(problem, problem.integrals()), Drift(problem, problem.integrals(), [Fraction(-1)])
+    for index, row in enumerate(rows):
+        drift(Fraction(index), row.tolist() if index in (3, 1500) else row)
+        one_by_one(Fraction(index), row)
+        if index in (0, 100, 1030):
+            assert {running.count for running in drift.quantities().values()} == {index + 1}
+    assert drift.metrics() == one_by_one.metrics()
+    assert drift.running["energy"].count == 2100
 
 
 def true(known: DeloneHomoclinic) -> Truth:

@@ -404,20 +404,20 @@ def sretensky(p: Parameters, y: Sequence[Scalar], axes: Axes) -> Any:
     return goryachev_chaplygin(p, y, axes) - rotor * _equatorial_square(y, axes)
 
 
-class _Magnitude:
+class Magnitude:
     """A bound of |x| in a ring: that of a difference is a sum, so that no terms cancel."""
 
     def __init__(self, size: Any) -> None:
-        self.size: Any = size.size if isinstance(size, _Magnitude) else abs(size)
+        self.size: Any = size.size if isinstance(size, Magnitude) else abs(size)
 
-    def __add__(self, other: Any) -> _Magnitude:
-        return _Magnitude(self.size + _Magnitude(other).size)
+    def __add__(self, other: Any) -> Magnitude:
+        return Magnitude(self.size + Magnitude(other).size)
 
-    def __mul__(self, other: Any) -> _Magnitude:
-        return _Magnitude(self.size * _Magnitude(other).size)
+    def __mul__(self, other: Any) -> Magnitude:
+        return Magnitude(self.size * Magnitude(other).size)
 
-    def __truediv__(self, other: Any) -> _Magnitude:
-        return _Magnitude(self.size / _Magnitude(other).size)
+    def __truediv__(self, other: Any) -> Magnitude:
+        return Magnitude(self.size / Magnitude(other).size)
 
     __sub__ = __radd__ = __add__
     __rmul__ = __mul__
@@ -425,7 +425,7 @@ class _Magnitude:
 
 def largest(integral: Integral, p: Parameters, omega: Any) -> Any:
     """The sum of the absolute terms of a first integral where every |Ω_i| is ``omega`` and every |γ_i| is 1."""
-    return integral.value(p.mapped(_Magnitude), [*map(_Magnitude, (omega,) * 3), *map(_Magnitude, (1, 1, 1))]).size
+    return integral.value(p.mapped(Magnitude), [*map(Magnitude, (omega,) * 3), *map(Magnitude, (1, 1, 1))]).size
 
 
 def holding(top: HeavyTop, start: State, system: System | None = None) -> tuple[Integral, ...]:

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, NamedTuple
 
+import numpy
+
 from heavytop import arguments
 from heavytop.arguments import Number, Numbers, required
 from heavytop.display import Tabular, TitledTable
@@ -348,9 +350,8 @@ def drift(run: Trajectory) -> Drifts:
         raise InputError("The states of this run went to its observer.", "Propagate without an observer.")
     computed = run.principal or run
     measure = Drift(run.problem, run.problem.integrals())
-    beside: Any = computed.attitude if computed.attitude is not None else [()] * len(run.times)
-    for time, state, xi in zip(run.times, computed.states, beside, strict=True):
-        measure(time, [*state, *xi])
+    carried = computed.attitude is not None
+    measure.take_array(numpy.hstack([computed.states, computed.attitude]) if carried else computed.states)
     return Drifts(_summaries(measure.metrics(), DRIFT))
 
 
