@@ -195,9 +195,13 @@ class Drift(Statistics):
             self._take_waiting()
 
     def _take_waiting(self) -> None:
-        waiting = numpy.array(self._waiting)
+        self.take_array(numpy.array(self._waiting))
         self._waiting = []
-        self.take_array(waiting)
+
+    def metrics(self) -> dict[str, Metric]:
+        """As :meth:`Statistics.metrics`; states are taken in before, once, however often that is evaluated."""
+        self._take_waiting()
+        return super().metrics()
 
     def take_array(self, states: Any) -> None:
         """Take in an array of native states, one a row; none is kept for the series."""
