@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
 from decimal import Decimal
 from fractions import Fraction
 from random import Random
+from shlex import quote
 from typing import Any
 
 from heavytop.cases import Case
@@ -14,7 +16,7 @@ from heavytop.errors import InputError
 from heavytop.exact.catalogue import matches
 from heavytop.measure.motion import motion_texts
 from heavytop.measure.rounding_noise import FACTORS, factor, scaled
-from heavytop.precision import dot, exact_text
+from heavytop.precision import DOUBLE, dot, exact_text, time_text
 from heavytop.top.equations import GYROSTAT, VARIABLES
 from heavytop.top.heavy_top import HeavyTop, State, data_texts
 
@@ -55,6 +57,16 @@ def forms(case: Case) -> dict[str, str]:
         return {"command": _command(data)} | texts | {"python": _python(data)}
     command = f"heavytop propagate --case {case.name} --times {','.join(_TIMES)} --show quaternion,position"
     return {"command": command} | texts | {"python": _in_decimals(_python_of_body(case))}
+
+
+def rerun(
+    case: Case, times: Sequence[Fraction], precision: str, integrator: str, tolerance: str = "", reached: bool = True
+) -> str:
+    """The command that measures a motion again: its digits right, or how the run ends where it has not ``reached``."""
+    line = f"{forms(case)['command'].rpartition(' --times ')[0]} --times {','.join(map(time_text, times))}"
+    line += "" if precision == DOUBLE.name else f" --precision {precision}"
+    line += f" --integrator {quote(integrator)}" + (f" --tolerance {tolerance}" if tolerance else "")
+    return f"{line} --json | heavytop score -" if reached else line
 
 
 def _follows(data: dict[str, Any]) -> bool:

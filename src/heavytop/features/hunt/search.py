@@ -10,7 +10,6 @@ from functools import cache
 from itertools import product
 from math import gcd
 from pathlib import Path
-from shlex import quote
 from statistics import median, quantiles
 from time import process_time
 from typing import Any
@@ -37,13 +36,13 @@ from heavytop.features.hunt.measured import (
     with_data,
 )
 from heavytop.files import replace
-from heavytop.harness.case_text import forms
+from heavytop.harness.case_text import forms, rerun
 from heavytop.harness.plan import Top, document_of
 from heavytop.integrate.registry import Integrator, described
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.scalar import GUARD_BITS, largest, to_ball
 from heavytop.measure.truth import Truth, truth
-from heavytop.precision import Precision, decimal_text, shown, time_text
+from heavytop.precision import Precision, decimal_text, shown
 from heavytop.records import HEYOKA, MULTIWORD, OUT_OF_TIME
 from heavytop.top.amplification import rate
 from heavytop.top.equations import GYROSTAT, system_of
@@ -571,11 +570,8 @@ def case_of(motion: Motion, number: int) -> Case:
 
 def command_of(asked: Asked, motion: Motion, integrator: str, failed: bool) -> str:
     """The command that shows it again: the digits that are right, or how the run ends."""
-    line = forms(case_of(motion, 1))["command"].rpartition(" --times ")[0]
-    times = ",".join(time_text(asked.horizon * i / 10) for i in range(1, 11))
-    name = "" if asked.precision.name == "double" else f" --precision {asked.precision.name}"
-    line += f" --times {times}{name} --integrator {quote(integrator)}"
-    return line if failed else f"{line} --json | heavytop score -"
+    times = [asked.horizon * i / 10 for i in range(1, 11)]
+    return rerun(case_of(motion, 1), times, asked.precision.name, integrator, reached=not failed)
 
 
 def kept(path: Path) -> tuple[Motion, ...]:

@@ -17,13 +17,12 @@ from numpy.typing import NDArray
 from heavytop.cases import Case
 from heavytop.features.survey.measured import Chunk
 from heavytop.files import atomic_write
-from heavytop.harness.case_text import forms
+from heavytop.harness.case_text import rerun
 from heavytop.harness.rows import Task, data_of
 from heavytop.harness.sweeps import Sweep
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.scalar import of_fraction
-from heavytop.precision import parse, time_text
-from heavytop.records import CellMap, Histogram, Metric, Quantity, Row, RowKey, Spread, Worst, by_name
+from heavytop.records import CellMap, Histogram, Metric, Quantity, Row, Spread, Worst, by_name
 
 # The file of a survey: one Parquet row group a chunk, one row a motion.
 
@@ -265,20 +264,9 @@ def _worst(task: Task, case: Case, bad: _Bad) -> Worst:
     assert data is not None
     right = None if math.isnan(bad.digits) else round(bad.digits, 2)
     error = f"{-bad.minus_error:.8g}" if bad.reached else ""
-    return Worst(
-        case.name, bad.motion, bad.outcome, error, right, data, command(task.key, task.times, case, bad.reached)
-    )
-
-
-def command(key: RowKey, times: Sequence[Fraction], case: Case, reached: bool) -> str:
-    """The command that measures one motion again: the digits that are right, or, where it was not ``reached``, how the
-    run ends.
-    """
-    line = forms(case)["command"].rpartition(" --times ")[0]
-    precision = "" if parse(key.precision).name == "double" else f" --precision {key.precision}"
-    tolerance = f" --tolerance {key.subject.tolerance}" if key.subject.tolerance else ""
-    line += f" --times {','.join(map(time_text, times))}{precision} --integrator {key.subject.name}{tolerance}"
-    return f"{line} --json | heavytop score -" if reached else line
+    subject = task.key.subject
+    command = rerun(case, task.times, task.key.precision, subject.name, subject.tolerance, bad.reached)
+    return Worst(case.name, bad.motion, bad.outcome, error, right, data, command)
 
 
 def gathered(rows: Iterator[tuple[Task, Row]]) -> list[Row]:

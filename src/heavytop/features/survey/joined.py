@@ -18,7 +18,8 @@ import numpy
 from heavytop.cases import Case
 from heavytop.errors import InputError, why
 from heavytop.extras import require_extra
-from heavytop.features.survey.gathered import DATA, command
+from heavytop.features.survey.gathered import DATA
+from heavytop.harness.case_text import rerun
 from heavytop.harness.plan import uniform
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import exact, log10, parse
@@ -108,5 +109,5 @@ def _command(row: Row, columns: dict[str, Any], index: int, outcome: str) -> str
     inertia, moment, rotor, omega, gamma = (numbers[k : k + 3] for k in range(0, 15, 3))
     top = HeavyTop(inertia, 1, moment, rotor if any(rotor) else None)
     case = Case("motion", "a motion of a survey", system(row.system), top, State(omega, gamma))
-    times, _ = uniform(exact(row.key.horizon), row.samples)
-    return command(row.key, times, case, outcome == Outcome.SUCCESS.value)
+    (times, _), by = uniform(exact(row.key.horizon), row.samples), row.key.subject
+    return rerun(case, times, row.key.precision, by.name, by.tolerance, outcome == Outcome.SUCCESS.value)

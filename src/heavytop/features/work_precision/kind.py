@@ -51,6 +51,7 @@ ERROR_MAX, ERROR_FINAL = ERRORS
 RETURN = Quantity("return_error")
 _RUNGS = {"tolerance": ["1e-6", "1e-9", "1e-12", FINEST], "step": ["1/10", "1/30", "1/100", "1/300"], "": [FINEST]}
 """Of an integrator that is measured beside heyoka in double, by what it is set by."""
+_MISSING = Metric("missing", None)
 _OF_OTHERS = 0.6
 """Decades of rounding noise of third-party integrators, whose step control turns a rounding into another step: rerun
 with other roundings, CVODE and splitting methods move by up to a decade."""
@@ -177,9 +178,9 @@ class WorkPrecision(Kind):
         seconds, alone = self._timed(task, integrate, sampled, error)
         done = alone.outcome is Outcome.SUCCESS and sampled.outcome is Outcome.SUCCESS
         if case.system is not GYROSTAT:
-            metrics[RETURN] = _returned(problem, alone, integrate) if done else _missing()
+            metrics[RETURN] = _returned(problem, alone, integrate) if done else _MISSING
         if not done:
-            metrics[ERROR_FINAL] = _missing()
+            metrics[ERROR_FINAL] = _MISSING
         run = replace(alone, times=sampled.times, states=sampled.states, seconds=seconds)
         if not done and alone.outcome is Outcome.SUCCESS:
             run = replace(run, outcome=sampled.outcome, time_reached=sampled.time_reached)
@@ -265,10 +266,6 @@ def _table(title: str, case: str, lines: Sequence[WorkPrecisionLine]) -> Cells:
     return Cells(title, columns, cells)
 
 
-def _missing() -> Metric:
-    return Metric("missing", None)
-
-
 def _setting(subject: Subject) -> tuple[str, Fraction] | None:
     """The setting of the integrator; None for the finest that it offers."""
     if FINEST in (subject.tolerance, subject.step):
@@ -302,7 +299,7 @@ def _metrics(scorer: Scorer, sampled: bool) -> dict[Quantity, Metric]:
         metrics[ERROR_MAX] = metric(omega.maximum.max(gamma.maximum))
         metrics[RELATIVE] = metric(scorer.error.running["relative"].maximum)
     elif scorer.error is not None:
-        metrics[ERROR_MAX] = _missing()
+        metrics[ERROR_MAX] = _MISSING
     return metrics
 
 
@@ -322,7 +319,7 @@ def _returned(problem: Problem, run: Trajectory, integrate: Any) -> Metric:
     end = [exact(value) for value in run.states[-1]]
     back = integrate([run.times[-1]], State([-value for value in end[:3]], end[3:]))
     if back.outcome is not Outcome.SUCCESS:
-        return _missing()
+        return _MISSING
     signs = (-1, -1, -1, 1, 1, 1)
     pairs = zip(signs, back.states[-1], problem.start.flat, strict=True)
     return of_fraction(max(abs(sign * exact(value) - start) for sign, value, start in pairs))

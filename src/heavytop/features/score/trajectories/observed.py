@@ -227,17 +227,6 @@ def require_matrix(rows: Sequence[Sequence[Fraction]], slack: Fraction, what: st
         )
 
 
-def require_rows(form: str, rows: Sequence[Sequence[Fraction] | None], places: Sequence[str], normalize: bool) -> None:
-    """Raises InputError for the first row whose quaternion or matrix is far from one of a rotation."""
-    for row, index in zip(rows, places, strict=True):
-        if row is None:
-            continue
-        if form == "quaternion":
-            require_direction(row, f"The quaternion of {index}")
-        if not normalize:
-            require_rotation(form, row, _FAR, f"The {form} of {index}")
-
-
 def raw_start(start: State) -> RawStart:
     """The start of a program: by its attitude where it has one, else by γ."""
     omega = start.omega if start.omega_space is None else start.omega_space
@@ -459,8 +448,11 @@ def observed(
     """
     rounded = {name: [row and rounded_state(list(row), precision) for row in rows] for name, rows in values.items()}
     for form in ("quaternion", "matrix"):
-        if form in rounded:
-            require_rows(form, rounded[form], places, normalize)
+        for row, place in zip(rounded.get(form, ()), places, strict=False):
+            if row is not None and form == "quaternion":
+                require_direction(row, f"The quaternion of {place}")
+            if row is not None and not normalize:
+                require_rotation(form, row, _FAR, f"The {form} of {place}")
     rows = [tuple(chain(*filter(None, parts))) if all(parts) else None for parts in zip(*rounded.values(), strict=True)]
     done = next((i for i, row in enumerate(rows) if row is None), len(rows))
     columns = {name: [row for row in part[:done] if row is not None] for name, part in rounded.items()}
