@@ -19,7 +19,7 @@ def child(count: int) -> None:
     import heavytop.harness.run
     from heavytop.api.run_folder import PlannedRun
     from heavytop.cases import CASES
-    from heavytop.features.drift.kind import Extent
+    from heavytop.features.drift.kind import DriftTable
     from heavytop.features.kinds import KINDS
     from heavytop.harness.checkpoint import Saved
     from heavytop.harness.rows import Task, computed
@@ -28,7 +28,8 @@ def child(count: int) -> None:
     times = tuple(range(1, 11))
     names = [f"euler-{index}" for index in range(count)]
     keys = [RowKey("drift", name, "heavy_top", computed("heyoka"), "double", horizon="10") for name in names]
-    tasks = [Task(key, key.case, "heyoka", CASES["euler"], times, times, Extent(False, False)) for key in keys]
+    table = DriftTable([], [], noise=False)
+    tasks = [Task(key, key.case, "heyoka", CASES["euler"], times, times, table) for key in keys]
     row = KINDS["drift"].measure(tasks[0], Saved())
 
     def rows(tasks, *_) -> Iterator:

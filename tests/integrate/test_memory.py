@@ -17,7 +17,7 @@ from heavytop.cases import CASES
 from heavytop.errors import Unsupported
 from heavytop.features.kinds import KINDS
 from heavytop.features.local_error.kind import _said
-from heavytop.features.work_precision.kind import Options
+from heavytop.features.work_precision.kind import WorkPrecisionTable
 from heavytop.harness import integrator_check
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.plan import read
@@ -354,9 +354,8 @@ def test_a_method_that_is_exact_on_a_motion_counts_no_step_too_few() -> None:
         run = propagate(top, start, times, precision, system=system)
         return replace(run, order=1, steps=20, flags={})
 
-    found = row(
-        of_callable(exactly), "work_precision", tuple(Fraction(i, 5) for i in range(1, 11)), Options(), step="1/10"
-    )
+    table, times = WorkPrecisionTable([], "2", []), tuple(Fraction(i, 5) for i in range(1, 11))
+    found = row(of_callable(exactly), "work_precision", times, table, step="1/10")
     assert found.outcome == "success", found.reference.reason
     assert found.explained.kind == "steps"
     assert "it is exact on this motion, or takes more steps than it counts" in found.explained.text

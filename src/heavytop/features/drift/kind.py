@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 
@@ -25,13 +25,6 @@ from heavytop.report.render.plots import digits, growth
 from heavytop.report.render.text import COMPUTED, DIGITS, NOISE_BAND, largest_over
 
 NAME = "drift"
-
-
-class Extent(NamedTuple):
-    """Measurements of a run beside the usual."""
-
-    attitude: bool = False
-    noise: bool = True
 
 
 class DriftRun(msgspec.Struct, forbid_unknown_fields=True):
@@ -67,8 +60,7 @@ class DriftTable(PlanTable, tag=NAME):
         if self.step:
             positive([self.step], "step")
         subject, suffix = computed(self.integrator, step=self.step), f"/step={self.step}" if self.step else ""
-        options, request = Extent(self.attitude, self.noise), {"attitude": str(self.attitude)}
-        more = {"suffix": suffix, "options": options, "request": request}
+        more = {"suffix": suffix, "options": self, "request": {"attitude": str(self.attitude)}}
         return [
             Task.of_run(NAME, case, subject, precision, times, keep=keep, **more)
             for case in map(find, self.cases)

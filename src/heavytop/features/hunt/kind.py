@@ -56,7 +56,6 @@ class HuntTable(PlanTable, tag=NAME):
         name = f"{self.family}-{self.seed}"
         system = HEAVY_GYROSTAT.name if self.family == HEAVY_GYROSTAT.name else HEAVY_TOP.name
         key = RowKey(NAME, name, system, computed(self.integrator), parse(self.precision).name)
-        options = time_text(horizon), self.budget, self.family, self.against, self.limit, self.seed, self.found
         request = {
             "horizon": time_text(horizon),
             "budget": str(self.budget),
@@ -64,7 +63,7 @@ class HuntTable(PlanTable, tag=NAME):
             "limit": exact_text(exact(self.limit)) if self.limit else "",
             "found": self.found,
         }
-        return [Task(key, "", self.integrator, options=options, request=request)]
+        return [Task(key, "", self.integrator, options=self, request=request)]
 
 
 class HuntKind(Kind):
@@ -76,7 +75,7 @@ class HuntKind(Kind):
 
     def cost(self, task: Task) -> float:
         """Some 10 ms a motion."""
-        return 5.0 + 0.01 * float(task.options[1])
+        return 5.0 + 0.01 * float(task.options.budget)
 
     def assumed_band(self, subject: Subject) -> float:
         """The largest of many motions is chance."""
@@ -86,8 +85,8 @@ class HuntKind(Kind):
         """The search.  Raises PeerFailed for an integrator that cannot be used at all."""
         asked = _asked(task)
         hunted = hunt(asked)
-        if hunted.found and task.options[-1]:
-            keep(Path(task.options[-1]), [m.motion for m in hunted.found])
+        if hunted.found and task.options.found:
+            keep(Path(task.options.found), [m.motion for m in hunted.found])
         if hunted.found:
             return failed(task, _said(hunted))
         lost = f"{hunted.lost} of which no format of its size can follow"
@@ -104,17 +103,17 @@ class HuntKind(Kind):
 
 
 def _asked(task: Task) -> Asked:
-    horizon, budget, family, against, limit, seed, file = task.options
+    table: HuntTable = task.options
     return Asked(
         task.integrator,
         task.precision,
-        physical(horizon, "horizon"),
-        family,
-        described(against) if against else None,
-        float(physical(limit, "limit")) if limit else None,
-        budget,
-        seed=seed + task.seed,
-        first=kept(Path(file)) if file else (),
+        physical(table.horizon, "horizon"),
+        table.family,
+        described(table.against) if table.against else None,
+        float(physical(table.limit, "limit")) if table.limit else None,
+        table.budget,
+        seed=table.seed + task.seed,
+        first=kept(Path(table.found)) if table.found else (),
     )
 
 

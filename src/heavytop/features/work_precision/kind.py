@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 
@@ -57,13 +57,6 @@ _OF_OTHERS = 0.6
 with other roundings, CVODE and splitting methods move by up to a decade."""
 
 
-class Options(NamedTuple):
-    """Further measurements of a run."""
-
-    timings: bool = False
-    attitude: bool = False
-
-
 class Curve(msgspec.Struct, forbid_unknown_fields=True):
     """One integrator in one format; ``tolerances``, of which "eps" is the finest it offers, or ``steps`` if fixed."""
 
@@ -107,9 +100,8 @@ class WorkPrecisionTable(PlanTable, tag=NAME):
         (horizon,) = positive([self.horizon], "horizon")
         times, keep = uniform(horizon, self.samples)
         points = [(parse(curve.precision), subject) for curve in self.ladders for subject in curve.subjects()]
-        options = Options(self.timings, self.attitude)
         request = {"attitude": str(self.attitude)}
-        more = {"suffix": f"/T={self.horizon}", "keep": keep, "options": options, "request": request}
+        more = {"suffix": f"/T={self.horizon}", "keep": keep, "options": self, "request": request}
         return [
             Task.of_run(NAME, case, by, precision, times, subject=f"{by.name} {by.setting}", **more)
             for case in map(find, self.cases)
