@@ -25,6 +25,14 @@ def hunt_text(hunted: Hunted, documents: Sequence[dict[str, Any]], again: str) -
     return "\n".join([*lines, "The same search again:", f"  {again}"])
 
 
+def law_text(hunted: Hunted) -> str:
+    """The law that explains an error of this integrator."""
+    return (
+        f"{hunted.law:.2g} eps times the motion's own amplification times the root of its radians, "
+        "the law of nine tenths of the random tops"
+    )
+
+
 def worst_lines(hunted: Hunted) -> list[str]:
     """A line each of the worst motions whose error is explained."""
     eps = float(hunted.asked.precision.eps)
@@ -57,8 +65,7 @@ def _nothing(hunted: Hunted) -> list[str]:
     elif asked.limit is not None:
         beyond = f"an error of {asked.limit:.3g} eps T^1.5"
     else:
-        law = f"{hunted.law:.2g} eps times the motion's own amplification times the root of its radians"
-        beyond = f"an error two decades beyond what explains it: {law}, the law of nine tenths of the random tops"
+        beyond = f"an error two decades beyond what explains it: {law_text(hunted)}"
     lines = [fill(f"Nothing was found: no run failed, and none has {beyond}.", _WIDTH)]
     if hunted.worst:
         lines += ["The worst:", *_folded(worst_lines(hunted))]
