@@ -38,12 +38,14 @@ from heavytop.integrate.trajectory import Outcome
 
 def solve(given):
     assert given.step_limit == 10**7
+    os.environ["LEFT"] = "by solve"
     return midpoint(given)
 
 def sleeps(given):
     time.sleep(1000)
 
-def stuck(given):  # in one call of C that holds the interpreter
+def stuck(given):  # in one call of C that holds the interpreter, in a process that no other integrator had
+    assert "LEFT" not in os.environ
     subprocess.Popen(["sleep", "987"], start_new_session=True)
     re.match("(a+)+$", 60 * "a" + "b")
 
