@@ -116,7 +116,7 @@ def _map(cells: CellMap, label: str, digits: float, name: str) -> Picture:
         dark = 0.2 + 0.8 * (lost - low) / (high - low or 1.0)
         patch = Rectangle((x, y), width, height, linewidth=0, facecolor=COLOURS[0], **options)
         patch.set_alpha(round(dark, 2))
-        axes.add_patch(patch)
+        axes.add_artist(patch)
 
     for row, bottom, top in zip(cells.digits_lost, cells.y_edges, cells.y_edges[1:], strict=False):
         for value, left, right in zip(row, cells.x_edges, cells.x_edges[1:], strict=False):
