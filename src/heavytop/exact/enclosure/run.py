@@ -102,7 +102,7 @@ class EnclosureRun:
     falls: tuple[Fall, ...] = ()
     stride: int = 1
     lost_at: Fraction | None = None
-    _last: Step | None = None
+    last: Step | None = None
     _skipped: int = 0
 
     def at(self, time: Fraction) -> tuple[Step, Fraction] | None:
@@ -112,7 +112,7 @@ class EnclosureRun:
             if self.lost_at is not None and node.time >= self.lost_at:
                 return None
             if taken is None:
-                taken = self._last = self.step(node)
+                taken = self.last = self.step(node)
             if taken is None:
                 self.lost_at = node.time
                 return None
@@ -143,7 +143,7 @@ class EnclosureRun:
 
     def _nearest(self, time: Fraction) -> tuple[Step | None, Node]:
         """The last node known before ``time``, and the step from it where that is known too."""
-        last, nodes = self._last, self.nodes
+        last, nodes = self.last, self.nodes
         node = nodes[bisect_right(nodes, time, key=lambda node: node.time) - 1]
         if last is not None and node.time <= last.node.time <= time:
             return last, last.node
@@ -209,7 +209,7 @@ class Pilot:
             part = min(1.0, taken / _SETTLED)
             if taken and taken % _TRIED == 0 and hopeless(losses[-1], part * taken * _times_as_far(span, times[-1])):
                 break
-            following = run.step(node)
+            following = run.last = run.step(node)  # it may cover the time that is asked for
             if following is None:
                 break
             node = run.after(following)
