@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
 from fractions import Fraction
-from functools import partial
+from functools import cache, lru_cache, partial
 from typing import Any, cast
 
 from flint import arb
@@ -259,7 +259,7 @@ class ClaimModel(Kind):
     def measure(self, task: Task, saved: Saved) -> Row:
         """The row of one branch in one direction.  Raises OutOfReach where the true motion is not proven."""
         claim, branch = claim_of(task.given), cast(Branch, task.key.subject.branch)
-        truth, against = true_motion(claim, task.times)
+        truth, against = _shared_motion(claim, task.times)
         errors = {time: errors_of.model_error(claim, time, truth, branch) for time in task.times}
         metrics: dict[Quantity, Metric] = {}
         series = {}
@@ -356,8 +356,15 @@ def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[errors_o
     if proven is None:
         raise OutOfReach(f"{known.method} is not certified to {bits} bits.", "Ask for earlier times.")
     if not isinstance(known, DeloneHomoclinic):
-        return lambda time: (known.state(time, bits), known.attitude(time, bits)), proven.against
 
+        @cache
+        def enclosed(time: Fraction) -> tuple[list[arb], list[arb]]:
+            values = known.with_attitude(time, bits)
+            return values[:6], values[6:]
+
+        return enclosed, proven.against
+
+    @cache
     def delone(time: Fraction) -> tuple[list[arb], list[arb]]:
         phi, theta, psi = known.angles(time, bits)
         with working_precision(bits):
@@ -365,6 +372,10 @@ def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[errors_o
         return known.state(time, bits), list(xi)
 
     return delone, proven.against
+
+
+_shared_motion = lru_cache(maxsize=2)(true_motion)
+"""The true motion, which the branches of a claim share."""
 
 
 def _values(row: Row, component: str) -> dict[Fraction, str]:
