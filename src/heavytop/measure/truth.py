@@ -287,6 +287,7 @@ _DIGITS_A_BIT = Fraction(30103, 100000)
 _SPARE_DIGITS = 3
 _EFFORT = 1.0
 """Seconds that a second source at the horizon itself may cost; beyond, it is compared near 0 and near the horizon."""
+_SHARED_STATES = 1024
 
 Evaluate = Callable[[Fraction, int], Sequence[arb]]
 
@@ -354,7 +355,7 @@ def truth(problem: Problem, times: Sequence[Fraction], effort: float | None = No
     known = known_motion(replace(problem, xi=None), horizon)
     if isinstance(known, Known):
         if problem.xi is None:
-            return known.truth
+            return replace(known.truth, state=_states_of(problem) or known.solution.state)
         if (nine := _nine(known.solution, problem, horizon)) is not None:
             return Truth(known.against, nine)
     computed = _computed(problem, times, effort)
@@ -367,9 +368,9 @@ def truth(problem: Problem, times: Sequence[Fraction], effort: float | None = No
 
 def uncertified(problem: Problem, times: Sequence[Fraction]) -> Truth | str:
     """A truth for the scatter of runs that differ in their roundings alone: no second source is asked."""
-    form = closed_form(problem)
-    if form is not None:
-        return Truth(Against("proven", form.method), form.state).remembered()
+    form, state = closed_form(problem), _states_of(problem)
+    if form is not None and state is not None:
+        return Truth(Against("proven", form.method), state)
     return _computed(problem, times)
 
 
@@ -407,6 +408,13 @@ def closed_form(problem: Problem) -> ExactSolution | None:
         # rounded, γ is no longer parallel to M: the rotor is that of the exact data
         return Gyrostat(problem.top, problem.start, problem.parameters.rotor)
     return next(matches(problem.top, problem.start, problem.system), None)
+
+
+@lru_cache(maxsize=8)
+def _states_of(problem: Problem) -> Evaluate | None:
+    """The states of the closed form, which rows and reruns of one problem share; None without a form."""
+    form = closed_form(problem)
+    return None if form is None else lru_cache(maxsize=_SHARED_STATES)(form.state)
 
 
 @lru_cache(maxsize=32)
