@@ -536,18 +536,9 @@ class Scorer(DriftAndError):
             self._take(time, state)
 
     def _take(self, time: Fraction, state: Sequence[Any]) -> None:
-        drifts, errors = self._following(time, state)
-        self._drift.take(time, drifts)
+        self._drift.take(time, self._drift.following(state))
         if self._error is not None:
-            self._error.take(time, errors)
-
-    @whole_evaluation
-    def _following(self, time: Fraction, state: Sequence[Any]) -> tuple[list[Sums], Errors | None]:
-        error = self._error
-        truth = None if error is None else error.known(time)
-        with working_precision(self._drift.bits):
-            y = to_balls(state)  # once for both
-            return self._drift.sums(y), None if error is None or truth is None else error.errors(y[:6], truth)
+            self._error(time, state)
 
     def take(self, times: Iterable[Fraction], states: Iterable[Sequence[Any]]) -> None:
         """Take in an array of native states, one at each of the exact times."""
@@ -600,9 +591,6 @@ class Rough:
 
     def __getitem__(self, where: Any) -> Rough:
         return Rough(self.value[where], self.error[where])
-
-    def __neg__(self) -> Rough:
-        return Rough(-self.value, self.error)
 
     def __add__(self, other: Rough) -> Rough:
         return _rounded(self.value + other.value, self.error + other.error)
