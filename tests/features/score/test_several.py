@@ -23,9 +23,10 @@ def scored(path: str, step: str, error: float | None, method: str = "rk4", code:
 
 def test_the_order_is_that_of_the_two_finest_steps_above_rounding() -> None:
     files = [scored("a", "1/10", 1e-3), scored("c", "1/40", 1e-15), scored("b", "1/20", 1e-3 / 16)]
+    files.append(scored("coarse", "1/5", 2e-3))
     (found,) = orders([*files, scored("other", "1/20", 1.0, "euler"), scored("unsaid", "0", 1e-2)])
-    assert (found.paths, round(found.order, 9)) == (("a", "b", "c"), 4)
-    assert "order 4.0 over 3 steps: a to c" in text(files)
+    assert (found.paths, round(found.order, 9)) == (("coarse", "a", "b", "c"), 4)
+    assert "order 4.0 over 4 steps: coarse to c" in text(files)
 
 
 def test_an_explanation_is_its_name_and_words_and_says_where_the_names_are() -> None:
