@@ -158,6 +158,20 @@ def test_at_odd_scales_numbers_are_those_of_balls(monkeypatch, exponent: int) ->
     assert (len(counted) == 40) == (not -20 < exponent < 20)
 
 
+@pytest.mark.parametrize("size", [1e153, 1.2e154, 1.3e154, 1e155, 1e300])
+def test_squares_whose_sum_is_beyond_a_double_are_added_as_balls(size: float) -> None:
+    lagrange = case("lagrange")
+    problem = Problem.of(lagrange.top, lagrange.start, DOUBLE)
+    known = closed_form(problem)
+    at_once, one_by_one = Scorer(problem, true(known)), Scorer(problem, true(known))
+    one_by_one.one_by_one()
+    state = numpy.array([size, *map(float, problem.start.flat[1:])])
+    for index in range(1, 31):
+        for scorer in (at_once, one_by_one):
+            scorer(Fraction(index, 30), state)
+    assert at_once.metrics() == one_by_one.metrics()
+
+
 class Depth:
     """How many operations a term of an expression goes through at most: those of both factors, of one summand."""
 

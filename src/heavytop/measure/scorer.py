@@ -628,8 +628,11 @@ def _sum(parts: Iterable[Rough]) -> Rough:
 def _largest_and_sum(squares: Rough) -> tuple[list[int], arb]:
     """Which of them may be the largest, and their sum."""
     largest = numpy.flatnonzero(squares.value + squares.error >= (squares.value - squares.error).max()).tolist()
-    total = math.fsum(squares.value)
-    return largest, arb(total, (math.fsum(squares.error) + _ROUNDING * total) * _ROOM)
+    try:
+        total, error = math.fsum(squares.value), math.fsum(squares.error)
+    except OverflowError:  # of finite squares whose sum is beyond a double
+        return largest, arb("nan")
+    return largest, arb(total, (error + _ROUNDING * total) * _ROOM)
 
 
 class _Samples:
