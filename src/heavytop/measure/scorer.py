@@ -226,7 +226,8 @@ class Drift(Statistics):
     def following(self, state: Sequence[Any]) -> list[Sums]:
         """The sums of the drifts with this native state; nothing is taken in."""
         with working_precision(self.bits):
-            return self.sums(to_balls(state))
+            pairs = zip(self.running.values(), self.values(to_balls(state)), strict=True)
+            return [running.following(drift) for running, drift in pairs]
 
     @whole_evaluation
     def _following_rows(self, rows: Any) -> dict[str, Sums]:
@@ -286,10 +287,6 @@ class Drift(Statistics):
     def values(self, y: Sequence[arb]) -> list[arb]:
         """The drifts of a state of balls, at a working precision of ``bits``."""
         return [value(self.parameters, y) - self.initial[name] for name, value in self.functions.items()]
-
-    def sums(self, y: Sequence[arb]) -> list[Sums]:
-        """The sums of the drifts with a state of balls, at a working precision of ``bits``."""
-        return [running.following(drift) for running, drift in zip(self.running.values(), self.values(y), strict=True)]
 
     def quantities(self) -> dict[Quantity, Running]:
         """The running values by what they are of."""
@@ -376,17 +373,13 @@ class SolutionError(Statistics):
         if truth is None:
             return None
         with working_precision(self.bits):
-            return self.errors(to_balls(state[:6]), truth)
+            values = self.values(to_balls(state[:6]), truth)
+            sums = [running.following(value) for running, value in zip(self.running.values(), values, strict=True)]
+            return sums, self.left(values[0])
 
     def known(self, time: Fraction) -> Sequence[arb] | None:
         """The true state; None where absent."""
         return self.truth.state(time, self.bits) if self.truth.covers(time) else None
-
-    def errors(self, y: Sequence[arb], truth: Sequence[arb]) -> Errors:
-        """:meth:`following` of a state of six balls, at a working precision of ``bits``."""
-        values = self.values(y, truth)
-        sums = [running.following(value) for running, value in zip(self.running.values(), values, strict=True)]
-        return sums, self.left(values[0])
 
     def values(self, y: Sequence[arb], truth: Sequence[arb]) -> list[arb]:
         """The errors of a state of six balls by :data:`COMPONENTS`, and relative, at the working precision."""
