@@ -75,6 +75,10 @@ def exponent(value: Fraction) -> int:
 #
 # Nothing of the user's (an observer, another package's integrator) may be called inside a block: it might wait for a
 # thread that waits for the lock.
+#
+# Ctrl-C comes after a call at the earliest.  From Python 3.14 on ``with _lock`` calls, and Ctrl-C between the lock and
+# its block would leave it held for ever.  So the lock is taken within a ``try``, and released by the first call of its
+# ``finally``; where Ctrl-C came before it was taken, that raises RuntimeError.
 
 
 P = ParamSpec("P")
@@ -158,7 +162,8 @@ def require_undisturbed() -> None:
 
 def _alone(thread: int) -> Generator[None, None, None]:
     """Holds the lock from the first ``next`` until it is closed or forgotten, wherever Ctrl-C comes meanwhile."""
-    with _lock:
+    try:
+        _lock.acquire()
         _held.own = ctx.prec, ctx.cap
         _held.context, _held.disturbed = _DEFAULTS, False
         _held.thread = thread
@@ -167,6 +172,11 @@ def _alone(thread: int) -> Generator[None, None, None]:
         finally:
             _held.thread = 0
             ctx.prec, ctx.cap = _held.own
+    finally:
+        try:  # noqa: SIM105 - no call before it
+            _lock.release()
+        except RuntimeError:
+            pass
 
 
 class _Block:
@@ -253,8 +263,8 @@ def whole_evaluation(function: Callable[P, Found]) -> Callable[P, Found]:
         if _held.thread == me:
             return function(*args, **kwargs)
         for attempt in range(_ATTEMPTS):
-            # a statement, not calls: Ctrl-C cannot come between the lock and its block, nor between the last lines
-            with _lock:
+            try:
+                _lock.acquire()
                 _held.own = ctx.prec, ctx.cap
                 interval = None
                 try:
@@ -281,6 +291,11 @@ def whole_evaluation(function: Callable[P, Found]) -> Callable[P, Found]:
                         ctx.prec, ctx.cap = _held.own
                     if interval is not None:
                         setswitchinterval(interval)
+            finally:
+                try:  # noqa: SIM105 - no call before it
+                    _lock.release()
+                except RuntimeError:
+                    pass
         raise ContextChanged
 
     return alone
