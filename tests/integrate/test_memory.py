@@ -372,7 +372,7 @@ def test_a_step_that_underflows_is_a_note_that_says_what_was_asked(tmp_path: Pat
     (tmp_path / "m.py").write_text(text)
     which = msgspec.structs.replace(program("ab4"), command=(sys.executable, "-S", "-E", str(tmp_path / "m.py"), "ab4"))
     contract = integrator_check._Contract(which)
-    assert integrator_check._judged("one", contract._one_time).verdict == "kept"
+    assert integrator_check._judged("one", dict(contract.parts())["one time"]).verdict == "kept"
     found = integrator_check._judged("huge", contract._huge)
     assert (found.verdict, found.text) == (
         "note",
