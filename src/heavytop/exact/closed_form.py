@@ -36,7 +36,7 @@ from heavytop.exact.flint.balls import (
 from heavytop.exact.solution import Conditions, ExactSolution, require
 from heavytop.precision import Vector, cross, dot, rational_root
 from heavytop.top.attitude import attitude_from_angles, perpendicular
-from heavytop.top.equations import HEAVY_TOP, Parameters, System
+from heavytop.top.equations import HEAVY_TOP, Parameters, System, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State
 
 # What the elliptic motions share: working precision, exact Taylor coefficients at the start, rotation in space.
@@ -218,6 +218,15 @@ def across(gamma: Vector) -> Vector:
     return candidates[0] if any(candidates[0]) else candidates[1]
 
 
+def derivatives_of_fixed(parameters: Parameters, start: State, vector: Sequence[Fraction]) -> list[list[Fraction]]:
+    """The first four derivatives at t = 0, exact, of the components of a vector fixed in space, in a heavy top."""
+
+    def field(p: Parameters, y: Any) -> tuple[Any, ...]:
+        return (*heavy_top(p, y[:6]), *HEAVY_TOP.attitude(p, y[:6], y[6:]))
+
+    return taylor(field, parameters, (*start.flat, *vector), 4)[6:]
+
+
 def carried_xi(gamma: Vector, carried: Callable[[Vector], tuple[Sequence[Any], Sequence[Any]]]) -> list[Any]:
     """ξ where it started as :func:`initial_xi` of γ, which need not be rational.
 
@@ -267,8 +276,22 @@ class Evaluated(ABC):
         return series
 
 
+class WithXi(Evaluated):
+    """A motion whose attitude is evaluated as its state is: :meth:`xi_at`."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def xi_at(self, time: Fraction) -> list[Any]:
+        """ξ at ``time``, at FLINT's working precision; raises Undecided where that does not suffice."""
+
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """ξ, a unit vector fixed in space and ⟂ γ, in body components; raises OutOfReach where it is not known."""
+        return to_bits(lambda _working: self.xi_at(time), bits, self.own_time(time))
+
+
 @dataclass(frozen=True, slots=True)
-class ClosedForm(Evaluated):
+class ClosedForm(WithXi):
     """The motion of ``top`` from ``start``; the dataclass of each case brings ``method``, ``source``, its conditions.
 
     body, starts: exact conditions on the top and on the start; the constructor raises NotInClass where one fails.
@@ -309,13 +332,8 @@ class WithAttitude(ClosedForm):
         omega, carry = self.motion(instant(time))
         return [*omega, *carry(balls(self.start.gamma))]
 
-    def attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """ξ, a unit vector fixed in space and ⟂ γ, in body components."""
-
-        def evaluate(_working: int) -> list[arb]:
-            return self.motion(instant(time))[1](initial_xi(self.start.gamma))
-
-        return to_bits(evaluate, bits, time)
+    def xi_at(self, time: Fraction) -> list[Any]:
+        return self.motion(instant(time))[1](initial_xi(self.start.gamma))
 
 
 class WithAngles(Evaluated):
@@ -357,8 +375,6 @@ def constant(value: Any) -> arb:
 
 Attitude = Callable[[Fraction, int], Sequence[Any]]
 """ξ at (time, bits): three balls; or Ω, γ, ξ: nine."""
-_KEPT = 8
-"""Working precisions whose turn at the start is remembered."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -371,31 +387,25 @@ class Turned:
 
     solution: ExactSolution
     own: Attitude
-    _turns: dict[int, tuple[arb, arb, arb]] = field(default_factory=dict, init=False, repr=False, compare=False)
+    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __call__(self, time: Fraction, bits: int) -> list[arb]:
         def evaluate(working: int) -> list[arb]:
-            cosine, sine, length = self._turn(working)
+            cosine, sine, length = _turn(self)
             state, xi = self.solution.state(time, working), self.own(time, working)
             eta = cross([g / length for g in state[3:]], xi)
             return [*state, *(cosine * x + sine * y for x, y in zip(xi, eta, strict=True))]
 
         return to_bits(evaluate, bits)
 
-    def _turn(self, working: int) -> tuple[arb, arb, arb]:
-        """Cosine and sine of the turn from the own ξ(0), and |γ|: the same at every time."""
-        rotation = self._turns.get(working)
-        if rotation is None:
-            gamma = self.solution.start.gamma
-            wanted, began = initial_xi(gamma), self.own(Fraction(0), working)
-            length = ball(dot(gamma, gamma)).sqrt()
-            across = cross([ball(g) / length for g in gamma], began)
-            turn = dot(wanted, began), dot(wanted, across), length
-            if len(self._turns) >= _KEPT:
-                self._turns.clear()
-            self._turns[working] = turn
-            return turn
-        return rotation
+
+@cached_per_precision
+def _turn(turned: Turned) -> tuple[arb, arb, arb]:
+    """Cosine and sine of the turn from the own ξ(0), and |γ|: the same at every time."""
+    gamma = turned.solution.start.gamma
+    wanted, began = initial_xi(gamma), turned.own(Fraction(0), current_precision())
+    length = ball(dot(gamma, gamma)).sqrt()
+    return dot(wanted, began), dot(wanted, cross([ball(g) / length for g in gamma], began)), length
 
 
 def starting_at(xi: Vector, gamma: Vector, known: Attitude) -> Attitude:

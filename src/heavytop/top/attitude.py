@@ -344,7 +344,9 @@ class Attitude:
             return None
         if None in quarters:
             return None
-        return self._product([_quarter(count or 0) for count in quarters], Fraction, lambda square: square)
+        turns = ((1, 0), (0, 1), (-1, 0), (0, -1))
+        right = [(Fraction(cosine), Fraction(sine)) for cosine, sine in (turns[count or 0] for count in quarters)]
+        return self._product(right, Fraction, lambda square: square)
 
     def rows(self, lib: Library, number: Number = lambda value: value) -> tuple[Any, Any, Any]:
         """The rows of R, as numbers of ``lib``.
@@ -383,12 +385,6 @@ class Attitude:
             for i in range(3)
         )
         return first, second, third
-
-
-def _quarter(count: int) -> tuple[Fraction, Fraction]:
-    """(cos, sin) of so many right angles."""
-    turn = ((1, 0), (0, 1), (-1, 0), (0, -1))[count]
-    return Fraction(turn[0]), Fraction(turn[1])
 
 
 def _square(rows: Iterable[Any]) -> Three[Vector]:

@@ -93,9 +93,7 @@ def principal_axes(tensor: Rows[Fraction], bits: int) -> PrincipalAxes:
 
 def _with_rest(tensor: Rows[Fraction], axes: Tensor, moments: Vector) -> PrincipalAxes:
     turned = multiplied(transposed(axes), multiplied(tensor, axes))
-    (a, b, c), (d, e, f), (g, h, i) = turned
-    first, second, third = (a - moments[0], b, c), (d, e - moments[1], f), (g, h, i - moments[2])
-    return PrincipalAxes(axes, moments, (first, second, third))
+    return PrincipalAxes(axes, moments, _less(turned, moments))
 
 
 def _spread(tensor: Rows[Fraction]) -> int:
@@ -116,10 +114,10 @@ def _spread(tensor: Rows[Fraction]) -> int:
     return spread // _GUARD_BITS * _GUARD_BITS
 
 
-def _less(tensor: Rows[Fraction], moment: Fraction) -> Three[Vector]:
-    """J − moment."""
+def _less(tensor: Rows[Fraction], moments: Sequence[Fraction]) -> Three[Vector]:
+    """J − diag(moments)."""
     (a, b, c), (d, e, f), (g, h, i) = tensor
-    return (a - moment, b, c), (d, e - moment, f), (g, h, i - moment)
+    return (a - moments[0], b, c), (d, e - moments[1], f), (g, h, i - moments[2])
 
 
 def _exact_moments(tensor: Rows[Fraction], near: Vector) -> Vector:
@@ -128,7 +126,7 @@ def _exact_moments(tensor: Rows[Fraction], near: Vector) -> Vector:
     moments = []
     for value in near:
         candidate = Fraction(round(value * common), common)
-        moments.append(candidate if determinant(_less(tensor, candidate)) == 0 else value)
+        moments.append(candidate if determinant(_less(tensor, [candidate] * 3)) == 0 else value)
     return moments[0], moments[1], moments[2]
 
 
@@ -137,7 +135,7 @@ def _rational(tensor: Rows[Fraction], near: Rows[Fraction]) -> PrincipalAxes | N
     turned = multiplied(transposed(near), multiplied(tensor, near))
     guess = (turned[0][0], turned[1][1], turned[2][2])
     moments = _exact_moments(tensor, guess)
-    if any(determinant(_less(tensor, moment)) for moment in moments):
+    if any(determinant(_less(tensor, [moment] * 3)) for moment in moments):
         return None
     vectors = _unit_vectors(tensor, moments)
     if vectors is None:
@@ -160,7 +158,7 @@ def _unit_vectors(tensor: Rows[Fraction], moments: Vector) -> list[Vector] | Non
     single = [moment for moment in moments if moments.count(moment) == 1]
     vectors = []
     for moment in single:
-        rows = _less(tensor, moment)
+        rows = _less(tensor, [moment] * 3)
         v = max((cross(rows[i], rows[j]) for i, j in ((0, 1), (1, 2), (2, 0))), key=lambda v: dot(v, v))
         length = rational_root(dot(v, v))
         if length is None:

@@ -321,31 +321,28 @@ def _shape_of(shapes: Sequence[Shape], centre: Vector) -> tuple[Tensor | None, T
     return rows(_in_axes(axes, (*moments, *_ZERO))), axes
 
 
-def _box(a: Fraction, b: Fraction, c: Fraction) -> Vector:
-    return (b * b + c * c) / 12, (a * a + c * c) / 12, (a * a + b * b) / 12
+_SIZES = {"box": 3, "cylinder": 2, "sphere": 1}
+"""Shapes of uniform mass, and how many numbers the edges, radius and length, or radius are."""
 
 
-def _cylinder(radius: Fraction, length: Fraction) -> Vector:
-    across = (3 * radius * radius + length * length) / 12
-    return across, across, radius * radius / 2
-
-
-def _sphere(radius: Fraction) -> Vector:
-    moment = Fraction(2, 5) * radius * radius
-    return moment, moment, moment
+def _uniform(kind: str, sizes: Sequence[Fraction]) -> Vector:
+    """Principal moments of a shape of unit mass."""
+    first, *more = (size * size for size in sizes)
+    if kind == "sphere":
+        return (2 * first / 5,) * 3
+    if kind == "box":
+        return (more[0] + more[1]) / 12, (first + more[1]) / 12, (first + more[0]) / 12
+    return (3 * first + more[0]) / 12, (3 * first + more[0]) / 12, first / 2
 
 
 def _primitive(numbers: _Numbers, geometry: Element) -> Vector | None:
     """Moments of a box, cylinder or sphere of unit mass, with its dimensions as attributes or elements."""
-    for kind in ("box", "cylinder", "sphere"):
-        shape = geometry.find(kind)
-        if shape is None:
-            continue
-        size, radius, length = (shape.get(key, shape.findtext(key)) for key in ("size", "radius", "length"))
-        if kind == "box":
-            return _box(*numbers.three(size, "size"))
-        half = numbers.one(radius, "radius")
-        return _sphere(half) if kind == "sphere" else _cylinder(half, numbers.one(length, "length"))
+    for kind, count in _SIZES.items():
+        if (shape := geometry.find(kind)) is not None:
+            size, *lengths = ((shape.get(key, shape.findtext(key)), key) for key in ("size", "radius", "length"))
+            return _uniform(
+                kind, numbers.three(*size) if kind == "box" else [numbers.one(*length) for length in lengths[:count]]
+            )
     return None
 
 
@@ -684,15 +681,11 @@ class _MjcfFrames:
                 continue
             values = self.attributes(geom)
             size, kind = numbers.read(values.get("size"), "size", ""), values.get("type", "sphere")
-            if (kind, len(size)) == ("box", 3):
-                moments = _box(*(2 * value for value in size))
-            elif (kind, len(size)) == ("cylinder", 2):
-                moments = _cylinder(size[0], 2 * size[1])
-            elif (kind, len(size)) == ("sphere", 1):
-                moments = _sphere(size[0])
-            else:
+            if len(size) != _SIZES.get(kind):
                 return []
-            shapes.append((*self.pose(numbers, geom, around), moments))
+            first, *more = size  # half the edges of a box, and half the length of a cylinder
+            sizes = [2 * first if kind == "box" else first, *(2 * value for value in more)]
+            shapes.append((*self.pose(numbers, geom, around), _uniform(kind, sizes)))
         return shapes
 
 

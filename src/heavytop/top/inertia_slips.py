@@ -170,13 +170,9 @@ def mending(body: MassProperties) -> str:
 
 def realisable(central: Tensor, slack: Fraction = Fraction(0)) -> bool:
     """Whether a body has this tensor about its centre of mass: positive moments, triangle inequality."""
-    return has_second_moments(central, slack) and not _is_rod(central, slack)
-
-
-def _is_rod(central: Tensor, slack: Fraction) -> bool:
-    """Whether a principal moment is 0 within rounding, or below it: all mass lies on a line, or is missing."""
-    least = max(slack, _SMALL * max(abs(value) for value in six_of(central)))
-    return not is_positive(central) or not _semidefinite(central, -least)
+    # a moment that is 0 within rounding, or below it: all mass lies on a line, or is missing
+    least = max(slack, _SMALL * max(map(abs, six_of(central))))
+    return has_second_moments(central, slack) and is_positive(central) and _semidefinite(central, -least)
 
 
 def slips(body: MassProperties) -> list[Slip]:

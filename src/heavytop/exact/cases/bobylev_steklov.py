@@ -15,7 +15,6 @@ Source: Leimanis, The General Problem of the Motion of Coupled Rigid Bodies abou
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
@@ -29,19 +28,19 @@ from heavytop.exact.closed_form import (
     balls,
     cached_per_precision,
     carried_xi,
+    derivatives_of_fixed,
     instant,
     rotate,
     sign,
-    taylor,
     turned,
 )
 from heavytop.exact.elliptic.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.elliptic.quartic import Companions, PreparedMotion, QuarticMotion
 from heavytop.exact.elliptic.weierstrass import Winding
-from heavytop.exact.flint.balls import Balls, ball, coefficient, series_length, to_bits
+from heavytop.exact.flint.balls import Balls, ball, coefficient, series_length
 from heavytop.exact.solution import ON_AXIS_1, ExactRelation
 from heavytop.precision import Vector, cross, dot
-from heavytop.top.equations import HEAVY_TOP, Parameters, heavy_top
+from heavytop.top.equations import HEAVY_TOP, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State
 
 # Attitude of the Bobylev-Steklov motions: axis 3 in space is a function of the second kind.
@@ -90,37 +89,6 @@ def axis_winding(top: HeavyTop, start: State) -> Winding:
     return Winding(value, slope, n1 / (4 * i3 * p) + h * p / (2 * n1 * square), square)
 
 
-def prepared_axis(top: HeavyTop, start: State, vector: Vector) -> tuple[PreparedMotion, Companions]:
-    """x, and Z3 of the exact ``vector`` ⟂ γ at the start, at the working precision; p and γ not 0."""
-    winding = axis_winding(top, start)
-    normal = tuple(c / winding.square for c in cross(start.gamma, vector))
-    parameters = HEAVY_TOP.parameters(top, start)
-    rows = [_third(parameters, start, fixed) for fixed in (vector, normal)]
-    motion = quartic_motion(top, start).prepared()
-    return motion, motion.companions(winding, turned(rows[0], rows[1], winding))
-
-
-def _third(parameters: Parameters, start: State, fixed: Sequence[Fraction]) -> list[Fraction]:
-    """The first four derivatives at 0 of the third component of a vector fixed in space."""
-
-    def field(p: Parameters, y: Any) -> tuple[Any, ...]:
-        return (*heavy_top(p, y[:6]), *HEAVY_TOP.attitude(p, y[:6], y[6:]))
-
-    return taylor(field, parameters, (*start.flat, *fixed), 4)[8]
-
-
-def carried(
-    motion: PreparedMotion, axis: Companions, time: Fraction, rate: arb, gamma: Sequence[arb]
-) -> tuple[list[arb], list[arb]]:
-    """Re Z and Im Z in body components at ``time``; rate: p, not 0.  gamma: γ at the time."""
-    point = motion.lattice.point(time, 2)
-    (third,) = axis.at(point, 1 / motion.denominator(point))
-    z3, z2 = third[0], coefficient(third, 1) / -rate
-    z1 = acb(0, 1) * (z3 * gamma[1] - z2 * gamma[2]) / dot(gamma, gamma).sqrt()
-    numbers = [acb(z) for z in (z1, z2, z3)]
-    return [z.real for z in numbers], [z.imag for z in numbers]
-
-
 def _off(top: HeavyTop, start: State) -> tuple[Fraction]:
     return (top.moment[0] * start.gamma[2] - top.inertia[2] * start.omega[0] * start.omega[2],)
 
@@ -145,13 +113,10 @@ class BobylevSteklov(ClosedForm):
         p, top, bend, side, up = lattice.shares
         return [p, arb(0), x, top + bend * (x * x), side * slope, up * x]
 
-    def attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """ξ, a unit vector fixed in space and ⟂ γ, in body components; at t = 0 ``initial_xi`` of γ.
-
-        Raises InputError for γ = 0.
-        """
-
-        return to_bits(lambda _working: carried_xi(self.start.gamma, partial(self._carried, time)), bits, time, 2)
+    def xi_at(self, time: Fraction) -> list[arb]:
+        """At t = 0 ``initial_xi`` of γ; raises InputError for γ = 0."""
+        with series_length(2):
+            return carried_xi(self.start.gamma, partial(self._carried, time))
 
     def _carried(self, time: Fraction, basis: Vector) -> tuple[list[arb], list[arb]]:
         """The vector :func:`across` γ, fixed in space, and γ × it/|γ| at ``time``."""
@@ -162,7 +127,13 @@ class BobylevSteklov(ClosedForm):
             first = rotate(balls(basis), self.start.omega, ball(time)) if rate else balls(basis)
             size = dot(gamma, gamma).sqrt()
             return first, list(cross([g / size for g in gamma], first))
-        return carried(*_axis(self), time, ball(rate), gamma)
+        motion, axis = _axis(self)
+        point = motion.lattice.point(time, 2)
+        (third,) = axis.at(point, 1 / motion.denominator(point))
+        z3, z2 = third[0], coefficient(third, 1) / -ball(rate)
+        z1 = acb(0, 1) * (z3 * gamma[1] - z2 * gamma[2]) / dot(gamma, gamma).sqrt()
+        numbers = [acb(z) for z in (z1, z2, z3)]
+        return [z.real for z in numbers], [z.imag for z in numbers]
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,18 +160,13 @@ class _Lattice:
         return self.amplitude * dn, self.steep * (sn * cn)
 
 
-def _height(case: BobylevSteklov) -> Fraction:
-    """h = n1 γ1 + ½ I3 Ω3²."""
-    return case.top.moment[0] * case.start.gamma[0] + case.top.inertia[2] * case.start.omega[2] ** 2 / 2
-
-
 @cached_per_precision
 def _lattice(case: BobylevSteklov) -> _Lattice | None:
     """None where nothing moves."""
     if not any(heavy_top(case.system.parameters(case.top, case.start), case.start.flat)):
         return None
     i3, n1, (p, _, x), gamma = case.top.inertia[2], case.top.moment[0], case.start.omega, case.start.gamma
-    h, speed, square = _height(case), -n1 * gamma[1] / i3, x * x
+    h, speed, square = n1 * gamma[0] + i3 * x * x / 2, -n1 * gamma[1] / i3, x * x
     b, c = h / i3 - p * p, (dot(gamma, gamma) * n1 * n1 - h * h) / i3**2
     spread = 2 * ball(b * b + c).sqrt()
     larger = spread + ball(2 * abs(b))
@@ -227,5 +193,10 @@ def _lattice(case: BobylevSteklov) -> _Lattice | None:
 
 @cached_per_precision
 def _axis(case: BobylevSteklov) -> tuple[PreparedMotion, Companions]:
-    """The part of the attitude that does not depend on the time."""
-    return prepared_axis(case.top, case.start, across(case.start.gamma))
+    """x, and Z3 of the vector :func:`across` γ at the start; p and γ not 0."""
+    top, start = case.top, case.start
+    winding, vector, parameters = axis_winding(top, start), across(start.gamma), HEAVY_TOP.parameters(top, start)
+    normal = tuple(c / winding.square for c in cross(start.gamma, vector))
+    first, second = (derivatives_of_fixed(parameters, start, fixed)[2] for fixed in (vector, normal))
+    motion = quartic_motion(top, start).prepared()
+    return motion, motion.companions(winding, turned(first, second, winding))

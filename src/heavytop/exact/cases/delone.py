@@ -37,7 +37,7 @@ from typing import Any
 from flint import acb, arb
 
 from heavytop.errors import NotInClass, OutOfReach
-from heavytop.exact.cases.kovalevskaya import Interval, along_gamma, interval_of, level_vector, pole
+from heavytop.exact.cases.kovalevskaya import Interval, along_gamma, branch_points, interval_of, level_vector, pole
 from heavytop.exact.cases.kovalevskaya_theta import KovalevskayaLevel, PhiRoot, start_of
 from heavytop.exact.closed_form import (
     ClosedForm,
@@ -137,11 +137,7 @@ def _turned(level: KovalevskayaLevel, state: Sequence[arb]) -> list[arb]:
 
 def _gap(curve: list[PhiRoot], interval: Interval, mu: arb) -> Gap:
     """The gap of V with the integral of the time."""
-    branch, lead = [acb(0)], arb(2)
-    for root in curve:
-        width = 1 / (root.value - mu)
-        branch.append(acb(width.real) if root.value.imag.is_zero() else width)
-        lead *= abs(mu - root.value)
+    branch, lead = branch_points(curve, mu)
     low, high = (branch[number].real for number in interval)
     others = [(b, 1) for number, b in enumerate(branch) if number not in interval]
     return Gap(low, high, Roots.of(lead, others), count=1, most=MOST_TERMS)

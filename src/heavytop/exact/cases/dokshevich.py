@@ -36,7 +36,6 @@ from heavytop.exact.flint.balls import (
     ball,
     exponent,
     to_bits,
-    whole_evaluation,
 )
 from heavytop.exact.separable.abel import decide, phase_at
 from heavytop.exact.separable.oscillation import Azimuth, Bearing, Gap, Roots, WithBearing
@@ -215,10 +214,6 @@ def _root_square(top: HeavyTop, _start: State) -> tuple[Fraction]:
     return (a * a - a * b + b * b + 3,)
 
 
-def _has_root(values: Sequence[Fraction]) -> bool:
-    return rational_root(values[0]) is not None
-
-
 def _constants(top: HeavyTop) -> _Constants:
     """The constants of a top with rational S."""
     _, _, a, b, _ = _numbers(top)
@@ -260,7 +255,12 @@ class Dokshevich(_Moving, ClosedForm):
         OFF_AXES_13,
         MOMENTS_1_3,
         HESS,
-        ExactRelation("S^2 = a^2 - ab + b^2 + 3 the square of a rational number", "S^2", _root_square, _has_root),
+        ExactRelation(
+            "S^2 = a^2 - ab + b^2 + 3 the square of a rational number",
+            "S^2",
+            _root_square,
+            lambda values: rational_root(values[0]) is not None,
+        ),
         ExactRelation("C2 < 0", "-C2", lambda top, _: (-_constants(top).lead,), positive),
     )
     starts = (
@@ -271,7 +271,8 @@ class Dokshevich(_Moving, ClosedForm):
 
     def __post_init__(self) -> None:
         ClosedForm.__post_init__(self)
-        _require_reach(self)
+        # x may all but rest, and the Fourier series of the integral be too long
+        decide(lambda: _swing(self), "The range of M·r is a point", _LEAST)
 
 
 @once
@@ -313,12 +314,6 @@ def _frame(motion: Any) -> _Frame:
 @cached_per_precision
 def _azimuth(motion: Any) -> Azimuth:
     return _swing(motion).azimuth()
-
-
-@whole_evaluation
-def _require_reach(motion: Any) -> None:
-    """Raises LevelNotDone where x all but rests, and where the Fourier series of the integral is too long."""
-    decide(lambda: _swing(motion), "The range of M·r is a point", _LEAST)
 
 
 @dataclass(frozen=True, slots=True)

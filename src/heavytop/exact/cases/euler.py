@@ -25,19 +25,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 from flint import acb, arb
 
-from heavytop.exact.closed_form import Carry, WithAttitude, balls, cached_per_precision, rotate, sign, unit
+from heavytop.exact.closed_form import (
+    CYCLIC,
+    Carry,
+    WithAttitude,
+    balls,
+    cached_per_precision,
+    orientation,
+    permuted,
+    rotate,
+    sign,
+    unit,
+)
 from heavytop.exact.elliptic.jacobi import Jacobi, Wave, jacobi, legendre_f, wave
 from heavytop.exact.elliptic.weierstrass import imag, real
 from heavytop.exact.flint.balls import BallLike, Balls, ball
 from heavytop.exact.solution import NO_TORQUE
 from heavytop.precision import cross, dot
-
-_EVEN = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +123,7 @@ def _lattice(case: Euler) -> _Lattice | None:
     inertia, omega = case.top.inertia, case.start.omega
     momentum = case.top.angular_momentum(omega)
     square, energy = dot(momentum, momentum), dot(omega, momentum)
-    roots = [(square * i + energy * j * k) / (i * j * k) for i, j, k in (_rotate(inertia, axis) for axis in range(3))]
+    roots = [(square * i + energy * j * k) / (i * j * k) for i, j, k in (permuted(inertia, axes) for axes in CYCLIC)]
     a, b, c = axes = tuple(sorted(range(3), key=lambda axis: -roots[axis]))
     ia, ib, ic = (inertia[axis] for axis in axes)
     rate2 = roots[a] - roots[c]
@@ -124,7 +132,7 @@ def _lattice(case: Euler) -> _Lattice | None:
     ab = (square - energy * ia) / (ib * (ib - ia))
     ac = (square - energy * ia) / (ic * (ic - ia))
     sign_a, sign_b = sign(omega[a]), sign(omega[b])
-    sign_c = sign_a * sign_b * sign(ia - ib) * (1 if (c, a, b) in _EVEN else -1)
+    sign_c = sign_a * sign_b * sign(ia - ib) * orientation((c, a, b))
     ratios = (omega[c] ** 2 / ac, omega[b] ** 2 / ab, omega[a] ** 2 / aa)
     origin = sign(omega[c]) * sign_c * legendre_f(*balls(ratios))
     sine2 = ia * ia * aa / square
@@ -148,10 +156,6 @@ def _lattice(case: Euler) -> _Lattice | None:
         frame=frame,
         turn=frame[1][b] / (value * unit(angle)),
     )
-
-
-def _rotate(values: Sequence[Fraction], axis: int) -> tuple[Fraction, Fraction, Fraction]:
-    return values[axis], values[(axis + 1) % 3], values[(axis + 2) % 3]
 
 
 def _frame(momentum: Sequence[Balls], length: arb, axis: int) -> tuple[Sequence[Balls], ...]:

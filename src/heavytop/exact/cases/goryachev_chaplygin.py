@@ -33,9 +33,7 @@ from heavytop.exact.flint.balls import (
     Undecided,
     ball,
     current_length,
-    midpoint,
     series_length,
-    whole_evaluation,
     working_precision,
 )
 from heavytop.exact.separable.abel import (
@@ -50,11 +48,12 @@ from heavytop.exact.separable.abel import (
     counts,
     decide,
     error_of,
+    ordered,
     points,
     refuse,
     variable_between,
 )
-from heavytop.exact.separable.oscillation import MOST_TERMS, Bearing, Gap, Roots, WithBearing, distance_of_others
+from heavytop.exact.separable.oscillation import MOST_TERMS, Bearing, Gap, WithBearing, distance_of_others
 from heavytop.exact.solution import AXIAL_ROTOR, GAMMA, LEVEL_MOMENTUM, plane_top
 from heavytop.top.equations import HEAVY_GYROSTAT, Parameters, sretensky
 
@@ -157,13 +156,8 @@ def gap_ends(level: GoryachevLevel, curve: Sequence[Root], places: Sequence[arb]
     Raises Undecided where the balls do not tell.
     """
     resting = _resting(level, curve)
-    real = sorted(
-        (i for i, root in enumerate(curve) if root.value.imag.is_zero()), key=lambda i: midpoint(curve[i].value.real)
-    )
-    if any(curve[low].value.overlaps(curve[high].value) for low, high in pairwise(real)):
-        raise Undecided
     allowed, inside = [], False
-    for low, high in pairwise([i for i in real if i not in resting.values()]):
+    for low, high in pairwise([i for i in ordered([root.value for root in curve]) if i not in resting.values()]):
         inside ^= curve[low].multiplicity % 2 == 1
         if inside:
             allowed.append((low, high))
@@ -244,7 +238,8 @@ class GoryachevMotion:
         """
         curve, places = roots(level), separated_start(level)
         ends = gap_ends(level, curve, places)
-        gaps = tuple(_variable(curve, pair) for pair in ends)
+        branch = [(root.value, root.multiplicity) for root in curve]
+        gaps = tuple(variable_between(pair, branch, arb(1) / 4, MOST_TERMS) for pair in ends)
         c, a = ball(level.moment_square).sqrt(), size_of(level)
         turned = level.turned()
         speeds = [c * (2 * turned[1] * turned[5] - turned[4] * u) for u in places]
@@ -326,16 +321,6 @@ def _distance(u: BallLike, root: acb, many: int, middle: arb) -> Any:
     if root.imag < 0:
         return 1
     return ((u - root.real) ** 2 + root.imag**2) ** many
-
-
-def _variable(curve: Sequence[Root], ends: tuple[int, int]) -> Variable:
-    """The gap between two simple roots, or the way from a simple one to a double one and back."""
-    low, high = (curve[number].value.real for number in ends)
-    if ends[0] == ends[1]:
-        return Rest(low)
-    rest = Roots.of(arb(1) / 4, [(root.value, root.multiplicity) for i, root in enumerate(curve) if i not in ends])
-    double = curve[ends[0]].multiplicity > 1, curve[ends[1]].multiplicity > 1
-    return variable_between(low, high, double, rest, MOST_TERMS)
 
 
 # Attitude of Goryachev and Chaplygin's top and of Sretensky's gyrostat: the azimuth of M, by Fourier series.
@@ -623,12 +608,6 @@ def _motion(case: GoryachevChaplygin) -> GoryachevMotion:
     return GoryachevMotion.of(GoryachevLevel.of(case.top, case.start))
 
 
-def _passes(curve: Sequence[Root], ends: tuple[int, int], double_root: Fraction) -> bool:
-    low, high = (curve[number].value.real for number in ends)
-    return not (low > ball(double_root) or high < ball(double_root))
-
-
-@whole_evaluation
 def _require_done(level: GoryachevLevel) -> None:
     """Raises NotInClass on the levels that are not done here, and too near to them."""
     resting = level.resting()
@@ -644,7 +623,9 @@ def _require_done(level: GoryachevLevel) -> None:
                 "The level is degenerate: G = 0, and both separated variables, or one, tend to 0.", REMEDY
             )
         moving = [(low, high) for low, high in ends if low != high]
-        if resting is not None and all(_passes(curve, pair, resting) for pair in moving):
+        if resting is not None and not any(
+            curve[low].value.real > ball(resting) or curve[high].value.real < ball(resting) for low, high in moving
+        ):
             raise LevelNotDone("The level is degenerate: one variable rests, and the other passes it.", REMEDY)
         apart = min((distance_of_others([root.value for root in curve], pair) for pair in moving), key=arb.mid)
         if not apart > _DISTANCE:

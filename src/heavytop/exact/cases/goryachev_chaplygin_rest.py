@@ -64,14 +64,6 @@ from heavytop.top.heavy_top import HeavyTop, State
 _MOST_VALUES = 1 << 14
 
 
-def _room_of(top: HeavyTop, start: State) -> tuple[Fraction]:
-    return (_room(GoryachevLevel.of(top, start)),)
-
-
-def _not_negative(values: Sequence[Fraction]) -> bool:
-    return values[0] >= 0
-
-
 def _off_axis(_top: HeavyTop, start: State) -> Sequence[Fraction]:
     """Ω1, Ω2, and γ3 at rest."""
     return (*start.omega[:2], Fraction(0) if start.omega[2] else start.gamma[2])
@@ -93,7 +85,12 @@ class GoryachevChaplyginRest(WithBearing, ClosedForm):
         GAMMA,
         LEVEL_MOMENTUM,
         ExactRelation("G = 0", "G", lambda top, start: (GoryachevLevel.of(top, start).third,)),
-        ExactRelation("h^2 <= |P r|^2 |gamma|^2", "the right side less the left", _room_of, _not_negative),
+        ExactRelation(
+            "h^2 <= |P r|^2 |gamma|^2",
+            "the right side less the left",
+            lambda top, start: (_room(GoryachevLevel.of(top, start)),),
+            lambda values: values[0] >= 0,
+        ),
         ExactRelation("M or the torque off axis 3", "one of these", _off_axis, any),
     )
 

@@ -30,7 +30,7 @@ from flint import arb
 from heavytop.exact.closed_form import ClosedForm, balls, cached_per_precision, initial_xi, rotate, taylor, turned
 from heavytop.exact.elliptic.quartic import Companions, PreparedMotion, QuarticMotion
 from heavytop.exact.elliptic.weierstrass import Point, Winding, imag, real
-from heavytop.exact.flint.balls import BallLike, Balls, ball, current_length, to_bits
+from heavytop.exact.flint.balls import BallLike, Balls, ball, current_length
 from heavytop.precision import Vector, cross, dot
 from heavytop.top.bodies import IDENTITY
 from heavytop.top.equations import GYROSTAT, Parameters, gyrostat, rotor
@@ -80,18 +80,13 @@ class Gyrostat(ClosedForm):
             return [*omega, *rotate(balls(self.start.gamma), self.angular_velocity, point.time)]
         return [*omega, *prepared.gamma.at(momentum, point, inverse)]
 
-    def attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """ξ, a unit vector fixed in space and ⟂ γ, in body components."""
-
-        def evaluate(_working: int) -> list[arb]:
-            xi = initial_xi(self.start.gamma)
-            momentum, point, inverse = self._momentum(time)
-            if self.permanent:
-                return rotate(xi, self.angular_velocity, point.time)
-            images = [unit.at(momentum, point, inverse) for unit in _units(self)]
-            return [dot(xi, components) for components in zip(*images, strict=True)]
-
-        return to_bits(evaluate, bits, time)
+    def xi_at(self, time: Fraction) -> list[arb]:
+        xi = initial_xi(self.start.gamma)
+        momentum, point, inverse = self._momentum(time)
+        if self.permanent:
+            return rotate(xi, self.angular_velocity, point.time)
+        images = [unit.at(momentum, point, inverse) for unit in _units(self)]
+        return [dot(xi, components) for components in zip(*images, strict=True)]
 
     def _momentum(self, time: Fraction) -> tuple[list[Any], Point, Any]:
         prepared, length = _prepared(self), current_length()

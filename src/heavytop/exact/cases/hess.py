@@ -55,7 +55,6 @@ from heavytop.exact.flint.balls import (
     exponent,
     midpoint,
     unit_of_time,
-    whole_evaluation,
 )
 from heavytop.exact.separable.abel import REMEDY, decide, phase_at
 from heavytop.exact.separable.oscillation import MOST_TERMS, Azimuth, Bearing, Gap, Roots, WithBearing
@@ -168,7 +167,8 @@ class Hess(WithBearing, ClosedForm):
         cubic = level.cubic()
         if cubic.gcd(cubic.derivative()).degree() > 0:
             raise LevelNotDone("The level is degenerate: P r·gamma rests at a double root.", REMEDY)
-        _require_reach(level)
+        # the Fourier series of the elliptic integral may be too long, or the linear system
+        decide(lambda: plan(_linear(level, level.gap(_MOST_TERMS))), "The level is all but degenerate", _LEAST)
 
     def own_time(self, time: Fraction) -> Fraction:
         """In the level's unit: the matrix over its period costs much at many bits."""
@@ -191,12 +191,6 @@ def _azimuth(case: Hess) -> Azimuth:
 @cached_per_precision
 def _motion(case: Hess) -> HessMotion:
     return HessMotion.of(HessLevel.of(case.top, case.start))
-
-
-@whole_evaluation
-def _require_reach(level: HessLevel) -> None:
-    """Raises LevelNotDone where the Fourier series of the elliptic integral is too long, or the linear system."""
-    decide(lambda: plan(_linear(level, level.gap(_MOST_TERMS))), "The level is all but degenerate", _LEAST)
 
 
 def _linear(level: HessLevel, gap: Gap) -> System2:
@@ -247,13 +241,10 @@ class HessMotion:
 
         Raises Undecided where the working precision does not prove the phase.
         """
-        phase, turns = self._phase(time)
+        phase, turns = phase_at(self.gap, self.origin + time)
         u, v = (self.matrix.at(phase, turns) * self.spinor).entries()
         scale = arb(2) ** -_exponent(abs(u) + abs(v))
         return self._state(*solved((phase, u * scale, v * scale), self._rates))
-
-    def _phase(self, time: arb) -> tuple[arb, int]:
-        return phase_at(self.gap, self.origin + time)
 
     def azimuth(self) -> Azimuth:
         """That of n about γ: Λ' = C0 |γ| N²/(N²|γ|² − s²)."""
@@ -265,7 +256,7 @@ class HessMotion:
 
     def bearing(self, azimuth: Azimuth, time: arb) -> Bearing:
         """n, level, and its azimuth at ``time``."""
-        phase, turns = self._phase(time)
+        phase, turns = phase_at(self.gap, self.origin + time)
         return Bearing.of(self.at(time)[3:], [ball(n) for n in self.level.moment], azimuth.at(phase, turns))
 
     def _rates(self, now: Sequence[Any]) -> list[Any]:
@@ -322,10 +313,6 @@ def _direction(top: HeavyTop, start: State) -> tuple[Fraction, Fraction]:
     return g2 * (a * a + c * c), a * g3 - c * g1
 
 
-def _in_plane(top: HeavyTop, start: State) -> tuple[Fraction]:
-    return (_direction(top, start)[0],)
-
-
 @dataclass(frozen=True, slots=True)
 class HessPendulum(WithAttitude):
     """A motion of Hess' top with M·γ = 0 and the centre of mass in the plane of axes 1 and 3.
@@ -341,7 +328,12 @@ class HessPendulum(WithAttitude):
         ACROSS_CENTRE,
         GAMMA,
         LEVEL_MOMENTUM,
-        ExactRelation("M, or the torque, off axis 2", "its part in the plane of axes 1 and 3", _in_plane, any),
+        ExactRelation(
+            "M, or the torque, off axis 2",
+            "its part in the plane of axes 1 and 3",
+            lambda top, start: _direction(top, start)[:1],
+            any,
+        ),
     )
 
     def motion(self, time: Balls) -> tuple[list[Balls], Carry]:

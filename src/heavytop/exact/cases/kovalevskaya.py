@@ -52,13 +52,11 @@ from heavytop.exact.flint.balls import (
     ball,
     coefficient,
     current_length,
-    midpoint,
     series_length,
     to_bits,
-    whole_evaluation,
 )
-from heavytop.exact.separable.abel import REMEDY, Line, Rest, Variable, decide, refuse, variable_between
-from heavytop.exact.separable.oscillation import Approach, Azimuth, Bearing, Gap, Roots, WithBearing, distance_of_others
+from heavytop.exact.separable.abel import REMEDY, Line, Rest, Variable, decide, ordered, refuse, variable_between
+from heavytop.exact.separable.oscillation import Approach, Azimuth, Bearing, Gap, WithBearing, distance_of_others
 from heavytop.exact.solution import GAMMA, NOT_XI, plane_top
 from heavytop.precision import shown
 
@@ -90,7 +88,7 @@ def intervals(level: KovalevskayaLevel, curve: Sequence[PhiRoot], start: Working
 
 def interval_of(variable: int, curve: Sequence[PhiRoot], start: WorkingStart, resting: Sequence[int] = ()) -> Interval:
     """Where w1 (variable 0) or w2 moves, as :func:`intervals`; resting: roots where another variable stays."""
-    real = [i for i in ordered(curve) if i not in resting]
+    real = [i for i in ordered([root.value for root in curve]) if i not in resting]
     allowed, inside = [(real[0] + 1, 0)], True
     for low, high in pairwise(real):
         inside ^= curve[low].multiplicity % 2 == 1
@@ -118,18 +116,9 @@ def _resting(level: KovalevskayaLevel, curve: Sequence[PhiRoot], start: WorkingS
     return resting
 
 
-def ordered(curve: Sequence[PhiRoot]) -> list[int]:
-    """The numbers of the real roots, rising; raises Undecided where two balls meet."""
-    real = [i for i, root in enumerate(curve) if root.value.imag.is_zero()]
-    real.sort(key=lambda i: midpoint(curve[i].value.real))
-    if any(curve[i].value.overlaps(curve[j].value) for i, j in pairwise(real)):
-        raise Undecided
-    return real
-
-
 def pole(curve: Sequence[PhiRoot], occupied: Sequence[Interval]) -> tuple[arb, float]:
     """μ, outside both gaps, where the branch points in v come to lie as far from the gaps as possible; and how far."""
-    real = ordered(curve)
+    real = ordered([root.value for root in curve])
     taken = {(upper - 1, lower - 1) for upper, lower in occupied}
     lowest, highest = (curve[i].value.real.mid() for i in (real[0], real[-1]))
     candidates = [highest + share * (highest - lowest) for share in _BEYOND]
@@ -205,11 +194,9 @@ class AbelMotion:
         start, curve = start_of(level), roots(level)
         ends = intervals(level, curve, start)
         mu, _ = pole(curve, ends)
-        branch = (acb(0), *(_real(1 / (root.value - mu), root.value) for root in curve))
-        lead = arb(2)
-        for root in curve:
-            lead *= abs(mu - root.value) ** root.multiplicity
-        gaps = tuple(_variable(branch, curve, interval, lead, most) for interval in ends)
+        branch, lead = branch_points(curve, mu)
+        points = [*zip(branch, (1, *(root.multiplicity for root in curve)), strict=True)]
+        gaps = tuple(variable_between(interval, points, lead, most) for interval in ends)
         phases = start_phases(start, mu, gaps)
         line = Line.of(gaps, (1, 1), (-1, 0), phases)
         cubic = tuple(i for i, root in enumerate(curve, 1) if root.cubic)
@@ -371,9 +358,14 @@ def _fourth_root(left: BallLike, right: BallLike) -> acb:
     return possible[0]
 
 
-def _real(value: acb, like: acb) -> acb:
-    """``value`` without the imaginary part that rounding gave it, where ``like`` is real."""
-    return acb(value.real) if like.imag.is_zero() else value
+def branch_points(curve: Sequence[PhiRoot], mu: arb) -> tuple[tuple[acb, ...], arb]:
+    """The branch points in v, real where the roots are, number 0 at 0; and |c6|."""
+    branch, lead = [acb(0)], arb(2)
+    for root in curve:
+        value = 1 / (root.value - mu)
+        branch.append(acb(value.real) if root.value.imag.is_zero() else value)
+        lead *= abs(mu - root.value) ** root.multiplicity
+    return tuple(branch), lead
 
 
 def start_phases(start: WorkingStart, mu: arb, variables: Sequence[Variable]) -> list[arb]:
@@ -386,16 +378,6 @@ def start_phases(start: WorkingStart, mu: arb, variables: Sequence[Variable]) ->
         rates = v1.derivative()[0] / v2[0], -v2.derivative()[order] / v1[order]
         slopes = [rate * apart * g.density(v[0]) for rate, g, v in zip(rates, variables, (v1, v2), strict=True)]
     return [g.phase(v[0], slope) for g, v, slope in zip(variables, (v1, v2), slopes, strict=True)]
-
-
-def _variable(branch: Sequence[acb], curve: Sequence[PhiRoot], interval: Interval, lead: arb, most: int) -> Variable:
-    """The gap between two simple branch points, or the way from a simple one to a double one and back."""
-    low, high = (branch[number].real for number in interval)
-    if interval[0] == interval[1]:
-        return Rest(low)
-    many = [1, *(root.multiplicity for root in curve)]
-    rest = Roots.of(lead, [(b, many[i]) for i, b in enumerate(branch) if i not in interval])
-    return variable_between(low, high, (many[interval[0]] > 1, many[interval[1]] > 1), rest, most)
 
 
 # Attitude of Kovalevskaya's top at any time: a level vector of the state whose azimuth is one more Abel integral.
@@ -613,7 +595,6 @@ def _has_thetas(level: KovalevskayaLevel) -> bool:
     return len(values) == 5 and separation(values) >= SEPARATION
 
 
-@whole_evaluation
 def _require_done(level: KovalevskayaLevel) -> None:
     """Raises NotInClass on the levels that are not done here."""
     cubic, double = level.cubic(), level.double()
@@ -621,7 +602,8 @@ def _require_done(level: KovalevskayaLevel) -> None:
         raise LevelNotDone("The level is degenerate: the cubic (w + h)(w^2 + G) - C^2/2 has a double root.", REMEDY)
     name = "The level is degenerate"
     if double * double == level.fourth:
-        if _both_rest(level, double):
+        # w1 = w2 = e: a double root of the quadratic of both
+        if level.separated(double) == 0 and level.separated(double + 1) == level.separated(double - 1):
             raise LevelNotDone(f"{name}, and both separated variables rest at e = {shown(double)}.", REMEDY)
         name = f"{name}: l^2 = 2 |gamma|^2 (h + e) with e = {shown(double)}, e^2 = k^2"
 
@@ -632,18 +614,12 @@ def _require_done(level: KovalevskayaLevel) -> None:
     decide(test)
 
 
-def _both_rest(level: KovalevskayaLevel, double: Fraction) -> bool:
-    """Whether w1 = w2 = e: a double root of the quadratic of both."""
-    beside = level.separated(double + 1), level.separated(double - 1)
-    return level.separated(double) == 0 and beside[0] == beside[1]
-
-
 def _require_apart(curve: Sequence[PhiRoot], ends: Sequence[Interval], name: str) -> None:
     """Raises NotInClass where neither of the two forms evaluates the motion."""
     limits = [number for pair in ends if pair[0] != pair[1] for number in pair]
     if sum(curve[number - 1].multiplicity > 1 for number in limits if number) > 1:
         raise LevelNotDone(f"{name}, and both separated variables tend to e.", REMEDY)
-    order = [0, *(number + 1 for number in ordered(curve))]
+    order = [0, *(number + 1 for number in ordered([root.value for root in curve]))]
     for low, high in ends:
         resting = [one for one, other in ends if one == other and low != high]
         if resting and order.index(high) < order.index(resting[0]) < order.index(low):

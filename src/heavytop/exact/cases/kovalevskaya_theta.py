@@ -26,7 +26,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
-from itertools import combinations, product
+from itertools import accumulate, combinations, product
 from typing import Any
 
 from flint import acb, acb_mat, acb_series, arb, arb_mat, arb_series, fmpq_poly
@@ -241,20 +241,13 @@ def _number(characteristic: Characteristic) -> int:
     return 8 * a + 4 * b + 2 * c + d
 
 
-def _half_periods() -> tuple[Characteristic, ...]:
-    """η_1, ..., η_5."""
-    periods = [_plus(_CYCLES[1], _CYCLES[3])]
-    for cycle in _CYCLES:
-        periods.append(_plus(periods[-1], cycle))
-    return tuple(periods)
-
-
 def _odd(characteristic: Characteristic) -> bool:
     (a, b), (c, d) = characteristic
     return (a * c + b * d) % 2 == 1
 
 
-_ETA = _half_periods()
+_ETA = tuple(accumulate(_CYCLES, _plus, initial=_plus(_CYCLES[1], _CYCLES[3])))
+"""η_1, ..., η_5."""
 _PAIRS: tuple[tuple[int, int], ...] = ((0, 0), (0, 1), (1, 0), (1, 1))
 (_DELTA,) = (d for d in product(_PAIRS, _PAIRS) if _odd(d) and all(_odd(_plus(d, eta)) for eta in _ETA))
 

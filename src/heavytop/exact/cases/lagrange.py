@@ -42,6 +42,7 @@ from heavytop.exact.closed_form import (
     balls,
     cached_per_precision,
     carried_xi,
+    derivatives_of_fixed,
     in_units,
     initial_xi,
     instant,
@@ -58,14 +59,14 @@ from heavytop.exact.flint.balls import (
     ball,
     coefficient,
     current_length,
+    current_precision,
     exponent,
     rational,
     series_length,
-    to_bits,
 )
 from heavytop.exact.solution import AXIAL_ROTOR, SPHERICAL, SYMMETRIC, TORQUE
 from heavytop.precision import Vector, cross, dot
-from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, Parameters, heavy_top
+from heavytop.top.equations import HEAVY_GYROSTAT, Parameters, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State
 
 _ZERO, _ONE = Fraction(0), Fraction(1)
@@ -141,18 +142,13 @@ class Lagrange(ClosedForm):
         cubic = area**3 - 2 * area * energy * i1 * square - area * spin_square * square + 2 * i1 * spin * n * square**2
         return Winding(value, -cubic / (4 * i1**3 * square**2), area / (2 * i1 * square), square)
 
-    def attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """ξ, a unit vector fixed in space and ⟂ γ, in body components.
-
-        Raises OutOfReach where the axis has come so near to a sleeping top (a motion asymptotic to it, at large times)
-        that the angle about it is lost at any sensible precision.
+    def xi_at(self, time: Fraction) -> list[arb]:
+        """Not known where the axis has come so near to a sleeping top (a motion asymptotic to it, at large times) that
+        the angle about it is lost at any sensible precision.
         """
-
-        def evaluate(_working: int) -> list[arb]:
-            gamma = self.start.gamma
+        gamma = self.start.gamma
+        with series_length(2):
             return carried_xi(gamma, partial(self._both, time)) if time else initial_xi(gamma)
-
-        return to_bits(evaluate, bits, time, 2)
 
     def _both(self, time: Fraction, basis: Vector) -> tuple[list[arb], Vector]:
         """The vector ``basis`` and γ × basis/|γ|, fixed in space, at ``time``."""
@@ -249,17 +245,11 @@ def _axis(motion: Lagrange) -> Companions:
     winding, square = motion.axis_winding(), dot(motion.start.gamma, motion.start.gamma)
     # s Z = s ξ + i γ × ξ, so Z = ξ + i s (γ × ξ/s²)
     normal = tuple(c / square for c in cross(motion.start.gamma, vector))
-    first, second = (_derivatives(motion, fixed) for fixed in (vector, normal))
+    first, second = (
+        _along(motion.frame[1], derivatives_of_fixed(motion.parameters, motion.start, fixed))
+        for fixed in (vector, normal)
+    )
     return _prepared(motion).motion.companions(winding, turned(first, second, winding))
-
-
-def _derivatives(motion: Lagrange, fixed: tuple[Fraction, ...]) -> list[Fraction]:
-    """The derivatives at 0 of a·ξ of a vector ξ fixed in space."""
-
-    def field(p: Parameters, y: Any) -> tuple[Any, ...]:
-        return (*heavy_top(p, y[:6]), *HEAVY_TOP.attitude(p, y[:6], y[6:]))
-
-    return _along(motion.frame[1], taylor(field, motion.parameters, (*motion.start.flat, *fixed), 4)[6:])
 
 
 # The spherical top, I1 = I2 = I3 with its centre of mass anywhere: Lagrange's top about r.
@@ -322,15 +312,9 @@ class LagrangeGyrostat(ClosedForm):
         turned = self._turned(_top_of(self).evaluate(time), instant(time))
         return [*turned[:2], turned[2] - ball(self._ahead), *turned[3:]]
 
-    def attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """ξ, a unit vector fixed in space and ⟂ γ, in body components."""
-
-        def evaluate(working: int) -> list[arb]:
-            known = _top_of(self).attitude(time, working + _ATTITUDE_BITS)
-            with series_length(1):
-                return self._turned(known, ball(time))
-
-        return to_bits(evaluate, bits, time)
+    def xi_at(self, time: Fraction) -> list[arb]:
+        known = _top_of(self).attitude(time, current_precision() + _ATTITUDE_BITS)
+        return self._turned(known, ball(time))
 
     def _turned(self, vectors: Sequence[Balls], time: Balls) -> list[Balls]:
         """Rz(k3 t/I3) of each three components."""

@@ -35,13 +35,12 @@ from heavytop.exact.flint.balls import (
     Undecided,
     ball,
     current_precision,
-    midpoint,
     rational,
     unit_of_time,
     whole_evaluation,
     working_precision,
 )
-from heavytop.exact.separable.abel import decide, phase_at
+from heavytop.exact.separable.abel import decide, ordered, phase_at
 from heavytop.exact.separable.oscillation import MOST_TERMS, Azimuth, Bearing, Gap, Roots, WithBearing
 from heavytop.exact.solution import GAMMA, ON_AXIS_1, ExactRelation, differ
 from heavytop.top.equations import HEAVY_TOP
@@ -180,12 +179,9 @@ class OneGapMotion:
 
         Raises Undecided where the working precision does not prove the phase.
         """
-        phase, turns = self._phase(time)
+        phase, turns = phase_at(self.gap, self.origin + time)
         (moving,) = solved([phase], lambda now: [1 / self.gap.density(self.gap.position(now[0]))])
         return self._state(moving, turns)
-
-    def _phase(self, time: arb) -> tuple[arb, int]:
-        return phase_at(self.gap, self.origin + time)
 
     def azimuth(self) -> Azimuth:
         """That of the level part of M about γ; see :meth:`Curve.turning`."""
@@ -200,7 +196,7 @@ class OneGapMotion:
 
     def bearing(self, azimuth: Azimuth, time: arb) -> Bearing:
         """M/w, level, and its azimuth at ``time``."""
-        phase, turns = self._phase(time)
+        phase, turns = phase_at(self.gap, self.origin + time)
         x, (q, r) = self.gap.position(phase), self._square_roots(phase, turns)
         s, t, u = (horner(height, x) for height in self.curve.heights)
         a, b, c = map(ball, self.curve.inertia)
@@ -250,12 +246,10 @@ def _roots(curve: IntervalCurve) -> list[_End]:
 
 def _gap_ends(roots: Sequence[_End], lead: arb, x: arb) -> tuple[_End, _End]:
     """Between which two real roots of QR the place x lies; raises Undecided where the balls do not tell."""
-    real = sorted((root for root in roots if root.place.imag.is_zero()), key=lambda root: midpoint(root.place.real))
+    real = [roots[number] for number in ordered([root.place for root in roots])]
     positive = bool(lead > 0) == (len(roots) % 2 == 0)
     possible = []
     for low, high in pairwise(real):
-        if low.place.overlaps(high.place):
-            raise Undecided
         positive = not positive
         if positive and not (x < low.place.real or x > high.place.real):
             possible.append((low, high))
@@ -325,7 +319,9 @@ class Steklov(WithBearing, ClosedForm):
 
     def __post_init__(self) -> None:
         ClosedForm.__post_init__(self)
-        _require_reach(self)
+        # the Fourier series of Abel's integral may be too long; nor is it decided beside a turning point
+        name = "Two moments of inertia all but satisfy an equality, or the start a turning point's"
+        decide(lambda: _motion(self), name, _LEAST)
 
     def evaluate(self, time: Fraction) -> list[BallLike]:
         rate, torque = _units(self.top, self.start)
@@ -347,13 +343,6 @@ def _motion(case: Steklov) -> OneGapMotion:
     p, q, r = (w / rate for w in case.start.omega)
     signs = (q > 0) - (q < 0), (r > 0) - (r < 0)
     return OneGapMotion.of(_curve(case.top, case.start), p, signs, max(current_precision(), _LEAST) * _TERMS_A_BIT)
-
-
-@whole_evaluation
-def _require_reach(case: Steklov) -> None:
-    """Raises LevelNotDone where the Fourier series of Abel's integral is too long, and beside a turning point."""
-    name = "Two moments of inertia all but satisfy an equality, or the start a turning point's"
-    decide(lambda: _motion(case), name, _LEAST)
 
 
 def _units(top: HeavyTop, start: State) -> tuple[Fraction, Fraction]:

@@ -56,7 +56,7 @@ from heavytop.exact.elliptic.weierstrass import (
     real,
     second_kind,
 )
-from heavytop.exact.flint.balls import BallLike, Balls, ball, current_length, rational, to_bits, unit_of_time
+from heavytop.exact.flint.balls import BallLike, Balls, ball, current_length, rational, unit_of_time
 from heavytop.exact.solution import NO_TORQUE
 from heavytop.precision import Vector, cross, dot
 from heavytop.top.bodies import IDENTITY
@@ -99,9 +99,10 @@ class ZhukovskyVolterra(ClosedForm):
         return self.top.rotor or (Fraction(0), Fraction(0), Fraction(0))
 
     @property
+    @once
     def permanent(self) -> bool:
         """Whether M is at rest in the body."""
-        return _is_permanent(self)
+        return not any(cross(self.momentum, self.start.omega))
 
     def coefficients(self) -> tuple[Fraction, ...]:
         """a0, a1, a2, a3, a4 of f."""
@@ -137,18 +138,13 @@ class ZhukovskyVolterra(ClosedForm):
         omega = [(m - ball(k)) * ball(1 / i) for m, k, i in zip(momentum, self._rotor, self.top.inertia, strict=True)]
         return [*omega, *_gamma(self).at(momentum, point, inverse)]
 
-    def attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """ξ, a unit vector fixed in space and ⟂ γ, in body components."""
-
-        def evaluate(_working: int) -> list[arb]:
-            xi = initial_xi(self.start.gamma)
-            if self.permanent:
-                return rotate(xi, self.start.omega, ball(time))
-            momentum, point, inverse = self._momentum(time)
-            images = [unit.at(momentum, point, inverse) for unit in _axes(self)]
-            return [dot(xi, components) for components in zip(*images, strict=True)]
-
-        return to_bits(evaluate, bits, self.own_time(time))
+    def xi_at(self, time: Fraction) -> list[arb]:
+        xi = initial_xi(self.start.gamma)
+        if self.permanent:
+            return rotate(xi, self.start.omega, ball(time))
+        momentum, point, inverse = self._momentum(time)
+        images = [unit.at(momentum, point, inverse) for unit in _axes(self)]
+        return [dot(xi, components) for components in zip(*images, strict=True)]
 
     def own_time(self, time: Fraction) -> Fraction:
         return _unit(self) * time
@@ -160,11 +156,6 @@ class ZhukovskyVolterra(ClosedForm):
         below, *above = _combined(curve.rows, _terms(point, curve.order))
         inverse = 1 / below
         return [part * inverse for part in above], point, inverse
-
-
-@once
-def _is_permanent(case: ZhukovskyVolterra) -> bool:
-    return not any(cross(case.momentum, case.start.omega))
 
 
 @once

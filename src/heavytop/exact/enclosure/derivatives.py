@@ -302,11 +302,6 @@ def _ldexp(value: float, exponent: int) -> float:
     return float(np.ldexp(value, max(-1000, exponent))) + 2.0**-1000
 
 
-def unit_columns(size: int, bits: int, columns: int) -> list[list[mpz]]:
-    """The derivatives at time 0: the unit matrix, and 0 for the data, in ulps of 2^-bits."""
-    return [[mpz((i == j) << bits) for j in range(columns)] for i in range(size)]
-
-
 # The derivatives of a vector field with respect to the data that enter it, from the field itself.
 #
 # A field of :mod:`heavytop.top.equations` is evaluated over power series a + b ε + ...: the coefficient of ε is its
@@ -524,7 +519,8 @@ def _require_right(tangent: Tangent, motion: ScaledMotion) -> None:
 def _run(tangent: Tangent, run: EnclosureRun, spans: list[Fraction]) -> Iterator[tuple[Fraction, Centre | None]]:
     """(span, centre and radii there) for each; None in place of them, and an end, where the errors are too large."""
     node, size, rate = run.nodes[0], tangent.field.dimension, run.motion.scaled.rate
-    columns = _Columns(unit_columns(size, tangent.precision, tangent.width), np.zeros((size, tangent.width)), 0)
+    unit = [[mpz((i == j) << tangent.precision) for j in range(tangent.width)] for i in range(size)]
+    columns = _Columns(unit, np.zeros((size, tangent.width)), 0)
     rest = list(spans)
     while rest:
         taken = _step(tangent, run, node)

@@ -309,7 +309,10 @@ class ScaledMotion:
                     if steps < _STEPS_A_WORD * grid.words:
                         break
                     return grid.total, True
-        return _ladder(bits), False
+        # multiples of an eighth of the power of two below
+        least = max(64, ceil(bits))
+        unit = 1 << max(4, least.bit_length() - 4)
+        return -(-least // unit) * unit, False
 
     def fewer(self, precision: int, lost: float) -> int:
         """The working precision that is enough where the last ``lost`` bits of ``precision`` are within the errors."""
@@ -371,13 +374,6 @@ def own_parameters(scaled: Scaled, p: Parameters) -> Parameters:
     return p.mapped(lambda value: Fraction(value) / unit)._replace(
         inertia=p.inertia, moment=tuple(gamma * n / unit**2 for n in p.moment)
     )
-
-
-def _ladder(bits: float) -> int:
-    """Multiples of an eighth of the power of two below."""
-    least = max(64, ceil(bits))
-    unit = 1 << max(4, least.bit_length() - 4)
-    return -(-least // unit) * unit
 
 
 _PILOT_BITS = 128

@@ -14,10 +14,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import ceil, expm1, log
 from typing import Any, NamedTuple, NoReturn, Self, TypeAlias
 
-from flint import arb, arb_mat, fmpq
+from flint import acb, arb, arb_mat, fmpq
 
 from heavytop.errors import LevelNotDone, OutOfReach
 from heavytop.exact.closed_form import solved
@@ -25,7 +26,9 @@ from heavytop.exact.flint.balls import (
     Balls,
     Undecided,
     current_precision,
+    midpoint,
     nearest_integer,
+    whole_evaluation,
     working_precision,
 )
 from heavytop.exact.separable.oscillation import Approach, Gap, Roots
@@ -244,6 +247,7 @@ REMEDY = "The validated enclosure holds for every motion."
 _DECISIONS, _RIGHT = (64, 256, 1024, 4096), 10
 
 
+@whole_evaluation
 def decide(
     test: Callable[[], object], name: str = "The level is degenerate but for less than about 1e-300", least: int = 64
 ) -> None:
@@ -272,17 +276,29 @@ def refuse(name: str, apart: arb, of: str) -> NoReturn:
     raise LevelNotDone(f"{name} but for {apart.str(2, radius=False)}, the distance of {of}.", REMEDY)
 
 
-def variable_between(low: arb, high: arb, double: tuple[bool, bool], rest: Roots, most: int) -> Variable:
-    """The gap between two simple roots, or the way from a simple one to a double one and back.
+def ordered(roots: Sequence[acb]) -> list[int]:
+    """The numbers of the real roots, rising; raises Undecided where two balls meet."""
+    real = sorted((i for i, root in enumerate(roots) if root.imag.is_zero()), key=lambda i: midpoint(roots[i].real))
+    if any(roots[i].overlaps(roots[j]) for i, j in pairwise(real)):
+        raise Undecided
+    return real
 
-    double: whether the lower and the upper one are.  Raises Undecided where the working precision does not part them,
-    OutOfReach for Fourier series of more than ``most`` terms.
+
+def variable_between(ends: tuple[int, int], roots: Sequence[tuple[acb, int]], lead: arb, most: int) -> Variable:
+    """The gap between two simple roots, or the way from a simple one to a double one and back; one at rest on a root.
+
+    ends: the numbers of the lower and the upper root.  roots: with multiplicities.  Raises Undecided where the working
+    precision does not part the ends, OutOfReach for Fourier series of more than ``most`` terms.
     """
+    low, high = (roots[number][0].real for number in ends)
+    if ends[0] == ends[1]:
+        return Rest(low)
     if not low < high:
         raise Undecided
-    if double[0]:
+    rest = Roots.of(lead, [root for number, root in enumerate(roots) if number not in ends])
+    if roots[ends[0]][1] > 1:
         return Approach(high, low, rest, most=most)
-    return Approach(low, high, rest, most=most) if double[1] else Gap(low, high, rest, most=most)
+    return Approach(low, high, rest, most=most) if roots[ends[1]][1] > 1 else Gap(low, high, rest, most=most)
 
 
 @dataclass(frozen=True, slots=True)

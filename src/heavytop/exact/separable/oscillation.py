@@ -33,8 +33,8 @@ from typing import Any
 from flint import acb, arb, arb_mat, arb_poly, fmpq
 
 from heavytop.errors import OutOfReach
-from heavytop.exact.closed_form import Evaluated, cached_per_precision, constant, tanh_sech
-from heavytop.exact.flint.balls import Balls, current_precision, to_bits, working_precision
+from heavytop.exact.closed_form import WithXi, cached_per_precision, constant, tanh_sech
+from heavytop.exact.flint.balls import Balls, current_precision, working_precision
 from heavytop.precision import cross, dot
 
 MOST_TERMS = 1 << 17
@@ -447,7 +447,7 @@ class Bearing:
         return [cosine * a - sine * b for a, b in zip(self.along, self.across, strict=True)]
 
 
-class WithBearing(Evaluated):
+class WithBearing(WithXi):
     """A motion that knows the bearing of one vector, and so the attitude.
 
     Mixed into the dataclass of each case, which brings ``made``.
@@ -462,17 +462,9 @@ class WithBearing(Evaluated):
         Raises Undecided where that does not suffice, OutOfReach where the azimuth is not known.
         """
 
-    def attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """ξ, a unit vector fixed in space and ⟂ γ, in body components; at t = 0 along the level part of
-        that vector.
-
-        Raises OutOfReach where it is not known.
-        """
-
-        def evaluate(working: int) -> list[arb]:
-            return self.bearing(time).carried(_began(self))
-
-        return to_bits(evaluate, bits, self.own_time(time))
+    def xi_at(self, time: Fraction) -> list[arb]:
+        """At t = 0 along the level part of that vector."""
+        return self.bearing(time).carried(_began(self))
 
 
 @cached_per_precision
