@@ -149,12 +149,14 @@ def test_at_odd_scales_numbers_are_those_of_balls(monkeypatch, exponent: int) ->
     top = HeavyTop(TOP.inertia, TOP.weight * scale**2, TOP.centre)
     problem = Problem.of(top, State([w * scale for w in START.omega], START.gamma), DOUBLE)
     rows = near_the_start(problem, 40, Random(exponent))
-    one_by_one = Drift(problem, problem.integrals(), [Fraction(-1)])
+    one_by_one = Drift(problem, problem.integrals())
+    one_by_one.one_by_one()
     for row in rows:
         one_by_one(Fraction(1), row)
+    expected = one_by_one.metrics()
     drift, counted = Drift(problem, problem.integrals()), balls_counted(monkeypatch)
     drift.take_array(rows)
-    assert drift.metrics() == one_by_one.metrics()
+    assert drift.metrics() == expected
     assert (len(counted) == 40) == (not -20 < exponent < 20)
 
 
@@ -236,7 +238,8 @@ def test_states_that_wait_are_counted_before_anything_is_told() -> None:
     """Also where arrays and lists take turns, and more come than wait."""
     problem = Problem.of(TOP, START, DOUBLE)
     rows = near_the_start(problem, 2100, Random(1))
-    drift, one_by_one = Drift(problem, problem.integrals()), Drift(problem, problem.integrals(), [Fraction(-1)])
+    drift, one_by_one = Drift(problem, problem.integrals()), Drift(problem, problem.integrals())
+    one_by_one.one_by_one()
     for index, row in enumerate(rows):
         drift(Fraction(index), row.tolist() if index in (3, 1500) else row)
         one_by_one(Fraction(index), row)
@@ -312,39 +315,47 @@ def test_native_numbers_become_exact_balls(precision) -> None:
 
 @pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, QUAD], ids=lambda p: p.name)
 @pytest.mark.parametrize("name", ["euler", "lagrange", "gyrostat"])
-def test_samples_at_once_and_one_by_one_give_the_same_text(name: str, precision) -> None:
+def test_samples_at_once_and_one_by_one_give_the_same_text(monkeypatch, name: str, precision) -> None:
     known = case(name)
     problem = Problem.of(known.top, known.start, precision, known.system)
     truth = Truth(Against("proven"), closed_form(problem).state)
     times = [Fraction(time) for time in range(1, 81)]
     options = {"threshold": 40 * precision.eps, "until": 60.0}
-    scorers = [Scorer(problem, truth, times[9::20], **options) for _ in range(2)]
+    scorers = [Scorer(problem, truth, times[9::20], **options) for _ in range(3)]
     for scorer in scorers:
         propagate(known.top, known.start, times, precision, system=known.system, observer=scorer)
-    one, two = scorers
+    one, two, three = scorers
     two.one_by_one()
+    counted = evaluations_counted(monkeypatch)
     assert one.metrics() == two.metrics()
+    assert 0 < len(counted) < 40
     assert one.series(str) == two.series(str)
     assert one.error.escape == two.error.escape
-    assert one.summarised
-    assert not two.summarised
-    one(Fraction(81), problem.start.flat)
-    two(Fraction(81), problem.start.flat)
-    assert one.metrics() == two.metrics()
-    assert one.content() == two.content()
+    assert three.content() == two.content()
+    for scorer in scorers:
+        scorer(Fraction(81), problem.start.flat)
+    assert one.metrics() == two.metrics() == three.metrics()
+    assert three.content() == two.content()
 
 
-def test_a_state_that_is_not_finite_and_a_digit_that_stays_open_are_taken_one_by_one() -> None:
+def evaluations_counted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Errors of single states that are evaluated as balls."""
+    counted, values = [], SolutionError.values
+    monkeypatch.setattr(SolutionError, "values", lambda *args: counted.append(1) or values(*args))
+    return counted
+
+
+def test_a_state_that_is_not_finite_and_a_digit_that_stays_open_are_taken_one_by_one(monkeypatch) -> None:
     problem = Problem.of(TOP, START, DOUBLE)
     for value in (float("nan"), 0.5):
         wide = Truth(
             Against("computed"), lambda time, bits: [to_ball(x).union(to_ball(x + 0.001)) for x in START_DOUBLES]
         )
-        scorer = Scorer(problem, wide)
+        scorer, counted = Scorer(problem, wide), evaluations_counted(monkeypatch)
         for time in range(1, 41):
             scorer(Fraction(time), numpy.array([*START_DOUBLES[:5], value]))
         assert (scorer.metrics()["drift_energy_max"].value == "nan") == (value != value)
-        assert not scorer.summarised
+        assert len(counted) == 40
 
 
 def test_bounds_of_rough_numbers_hold_the_exact_ones() -> None:

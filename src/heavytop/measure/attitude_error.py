@@ -391,7 +391,7 @@ class ObservedScorer(DriftAndError):
         """Take in one sample."""
         state = state_of(values, self.said, self.posed, self.bits)
         if self.drift is not None and state is not None:
-            self.drift.take(time, self.drift.following(state))
+            self.drift(time, state)
         if self.error is not None:
             self.error(time, values, state)
         if self.joint is not None:

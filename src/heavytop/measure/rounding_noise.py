@@ -162,7 +162,7 @@ class Reruns:
             problems.append(replace(problem, parameters=_each(p, partial(mul, scale))))
         scorers = [scorer(problem) for problem in problems]
         self.integrator.propagate_many(problems, times, lambda i, time, state: scorers[i](time, state), threads=1)
-        summarise(scorers)
+        summarise(scorer.error for scorer in scorers if scorer.error is not None)
         return scorers
 
 

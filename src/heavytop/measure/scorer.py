@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cache, reduce
+from functools import cache, partial, reduce
 from typing import TYPE_CHECKING, Any
 
 import numpy
@@ -75,20 +75,31 @@ class Running:
         size = abs(value)
         return larger(self.maximum, size), self.squares + size * size, size
 
+    def following_all(self, counted: Sequence[int], value: Callable[[int], arb], squares: Rough | None) -> Sums:
+        """As :meth:`following`, with the values of these numbers.  Where their ``squares`` fix the printed digits of
+        the root mean square, balls are evaluated of the last and of those that may be the largest alone.
+        """
+        if not counted:
+            return self.maximum, self.squares, self.final
+        maximum, total, final = self.maximum, self.squares, self.final
+        places, more = ([], arb("nan")) if squares is None else _largest_and_sum(squares)
+        enough = decided(root((total + more) / (self.count + len(counted))))
+        for place in sorted({*places, len(counted) - 1}) if enough else range(len(counted)):
+            final = abs(value(counted[place]))
+            maximum = larger(maximum, final)
+            if not enough:
+                total = total + final * final
+        return maximum, total + more if enough else total, final
+
     def take(self, time: Fraction, sums: Sums, keep: bool) -> None:
         """Take in a value at ``time`` by its :meth:`following`; remember it for the series if ``keep``."""
-        self.take_several(sums, 1)
-        self.remember(time, sums, keep)
+        self.take_all(sums, 1, {time: sums[2]} if keep else {})
 
-    def take_several(self, sums: Sums, count: int) -> None:
-        """Take in so many values by the sums with all of them; none is kept for the series."""
+    def take_all(self, sums: Sums, count: int, kept: dict[Fraction, arb]) -> None:
+        """Take in so many values by the sums with all of them; kept: for the series, by time."""
         self.maximum, self.squares, self.final = sums
         self.count += count
-
-    def remember(self, time: Fraction, sums: Sums, keep: bool) -> None:
-        """Remember a value for the series if ``keep``, and count it for nothing else."""
-        if keep:
-            self.kept[time] = sums[2]
+        self.kept |= kept
 
     def metrics(self, quantity: Quantity) -> dict[Quantity, Metric]:
         """Its ``max``, ``rms`` and ``final``; ``missing`` without a sample."""
@@ -162,59 +173,85 @@ class Statistics:
             run.restore(content[quantity.component])
 
 
-class Drift(Statistics):
+class StatisticsOfStates(Statistics):
+    """Statistics of native states, which wait until they are many or a statistic is asked for.
+
+    Of many, arrays of doubles with proven errors tell which few may be the largest and what squares add up to.  Balls
+    are evaluated of these few, of the last and of those kept for the series; of all where a printed digit stays open.
+    """
+
+    at_once = True
+    """Whether arrays are used: sums by balls alone are those of any number of states at a time, to the bit."""
+
+    def __init__(self, problem: Problem, names: Iterable[str], keep: Sequence[Fraction], width: int) -> None:
+        self.problem, self.bits, self.keep = problem, problem.precision.bits + GUARD_BITS, frozenset(keep)
+        self.parameters = parameter_balls(problem, self.bits)
+        self._running = {name: Running() for name in names}
+        self._width = width
+        self._waiting: list[tuple[Fraction, Any]] = []
+
+    def __call__(self, time: Fraction, state: Sequence[Any]) -> None:
+        """Take in one native state."""
+        numbers = state[: self._width]
+        self._waiting.append((time, numbers.copy() if isinstance(numbers, numpy.ndarray) else numbers))
+        if len(self._waiting) == _ROWS:
+            self.settle()
+
+    def settle(self) -> None:
+        """Take in the states that wait."""
+        raise NotImplementedError
+
+    @property
+    def running(self) -> dict[str, Running]:
+        """The running values of all states by component."""
+        self.settle()
+        return self._running
+
+    def metrics(self) -> dict[str, Metric]:
+        """As :meth:`Statistics.metrics`; states are taken in before, once, however often that is evaluated."""
+        self.settle()
+        return super().metrics()
+
+    def one_by_one(self) -> None:
+        """Take in the states that wait, and all that follow, by balls alone."""
+        self.at_once = False
+        self.settle()
+
+    def _kept(self, times: Sequence[Fraction]) -> list[int]:
+        """The numbers of the times that are kept; a Fraction's hash takes as long as an operation on balls."""
+        return [i for i, time in enumerate(times) if time in self.keep] if self.keep else []
+
+
+class Drift(StatisticsOfStates):
     """|I(t) − I(0)| of each integral, absolute, from the rounded start; evaluated with 64 guard bits.
 
     problem: what the integrator was given.  integrals: those that hold for the exact top and start.
     keep: the times whose values go into the series.
-    With an attitude riding along, |ξ|² and ξ·γ are watched as well.  Where no time is kept, states wait until there
-    are many.
+    With an attitude riding along, |ξ|² and ξ·γ are watched as well.
     """
 
     def __init__(self, problem: Problem, integrals: Sequence[Integral], keep: Sequence[Fraction] = ()) -> None:
-        self.problem = problem
-        self.bits = problem.precision.bits + GUARD_BITS
-        self.keep = frozenset(keep)
         self.functions: dict[str, Callable[[Parameters, Any], Any]] = {i.name: i.value for i in integrals}
         if problem.xi is not None:
             self.functions["xi_squared"] = lambda _, y: dot(y[6:9], y[6:9])
             self.functions["xi_dot_gamma"] = lambda _, y: dot(y[6:9], y[3:6])
-        self.parameters = parameter_balls(problem, self.bits)
         self.start = (*problem.start.flat, *(problem.xi or ()))
+        super().__init__(problem, self.functions, keep, len(self.start))
         self.initial = self._values(self.start)
-        self.running = {name: Running() for name in self.functions}
-        self._waiting: list[Any] = []
 
-    def __call__(self, time: Fraction, state: Sequence[Any]) -> None:
-        """Take in one native state."""
-        if self.keep:
-            self.take(time, self.following(state))
-            return
-        self._waiting.append(numpy.array(state))
-        if len(self._waiting) == _ROWS:
-            self._take_waiting()
+    def settle(self) -> None:
+        """Take in the states that wait."""
+        if self._waiting:
+            times, states = zip(*self._waiting, strict=True)
+            self._waiting = []
+            self.take_array(states, times)
 
-    def _take_waiting(self) -> None:
-        self.take_array(numpy.array(self._waiting))
-        self._waiting = []
-
-    def metrics(self) -> dict[str, Metric]:
-        """As :meth:`Statistics.metrics`; states are taken in before, once, however often that is evaluated."""
-        self._take_waiting()
-        return super().metrics()
-
-    def take_array(self, states: Any) -> None:
-        """Take in an array of native states, one a row; none is kept for the series."""
+    def take_array(self, states: Any, times: Sequence[Fraction] = ()) -> None:
+        """Take in many native states, an array or a list; none is kept for the series without the times."""
         for first in range(0, len(states), _ROWS):
-            rows = states[first : first + _ROWS, : len(self.start)]
-            for name, sums in self._following_rows(rows).items():
-                self.running[name].take_several(sums, len(rows))
-
-    def take(self, time: Fraction, sums: Sequence[Sums]) -> None:
-        """Take in one state by its :meth:`following`."""
-        keep = bool(self.keep) and time in self.keep  # a Fraction's hash takes as long as an operation on balls
-        for running, values in zip(self.running.values(), sums, strict=True):
-            running.take(time, values, keep)
+            rows, at = states[first : first + _ROWS], times[first : first + _ROWS]
+            for running, (sums, kept) in zip(self._running.values(), self._following(rows, at), strict=True):
+                running.take_all(sums, len(rows), kept)
 
     @whole_evaluation
     def _values(self, state: Sequence[Fraction]) -> dict[str, arb]:
@@ -223,46 +260,32 @@ class Drift(Statistics):
             return {name: value(self.parameters, y) for name, value in self.functions.items()}
 
     @whole_evaluation
-    def following(self, state: Sequence[Any]) -> list[Sums]:
-        """The sums of the drifts with this native state; nothing is taken in."""
+    def _following(self, states: Any, times: Sequence[Fraction]) -> list[tuple[Sums, dict[Fraction, arb]]]:
+        """The sums of each drift with all of these states, and the values to keep; nothing is taken in."""
+        kept, squares = self._kept(times), dict[str, Rough]()
+        if self.at_once and len(states) >= max(_FEW, 2 * len(kept)) and self.problem.precision.bits <= EXTENDED.bits:
+            squares = self._squares(numpy.asarray(states)[:, : self._width])
         with working_precision(self.bits):
-            pairs = zip(self.running.values(), self.values(to_balls(state)), strict=True)
-            return [running.following(drift) for running, drift in pairs]
+            balls = cache(lambda index: to_balls(states[index]))
+            drift = cache(lambda name, i: self.functions[name](self.parameters, balls(i)) - self.initial[name])
+            return [
+                (
+                    running.following_all(range(len(states)), partial(drift, name), squares.get(name)),
+                    {times[i]: abs(drift(name, i)) for i in kept},
+                )
+                for name, running in self._running.items()
+            ]
 
-    @whole_evaluation
-    def _following_rows(self, rows: Any) -> dict[str, Sums]:
-        """The sums of the drifts with all of these states, by the integral; nothing is taken in."""
-        with numpy.errstate(all="ignore"):
-            changes = self._changes(rows)
-        with working_precision(self.bits):
-            balls = cache(lambda index: to_balls(rows[index]))
-            return {name: self._sums_of_rows(name, balls, len(rows), changes.get(name)) for name in self.functions}
-
-    def _sums_of_rows(self, name: str, balls: Callable[[int], list[arb]], count: int, change: Rough | None) -> Sums:
-        """The sums of one drift.  Where ``change`` fixes the printed digits of the root mean square, balls are
-        evaluated of the last state and of those that may be the largest alone.
-        """
-        running, value = self.running[name], self.functions[name]
-        maximum, squares, final = running.maximum, running.squares, running.final
-        places, total = ([], arb("nan")) if change is None else _largest_and_sum(change.squared())
-        mean = root((squares + total) / (running.count + count))
-        enough = decided(mean)
-        for index in sorted({*places, count - 1}) if enough else range(count):
-            final = abs(value(self.parameters, balls(index)) - self.initial[name])
-            maximum = larger(maximum, final)
-            if not enough:
-                squares = squares + final * final
-        return maximum, squares + total if enough else squares, final
-
-    def _changes(self, rows: Any) -> dict[str, Rough]:
-        """The drift of each integral as an array; none of few states, of other formats and at odd scales.
+    @numpy.errstate(all="ignore")
+    def _squares(self, rows: Any) -> dict[str, Rough]:
+        """The squared drifts of each integral as arrays; none of other numbers than sums of doubles, at odd scales.
 
         An operation on double-doubles is off by 16 u² at most, u = 2^-53 (Joldes, Muller, Popescu 2017), and no term of
         an integral goes through more than 16: I(t) − I(0) is off by 2^-96 of the sum of its absolute terms, and by what
         underflows.
         """
-        parameters, moving = self.problem.parameters, len(self.start)
-        if len(rows) < _FEW or self.problem.precision.bits > EXTENDED.bits or rows.dtype not in _SUMS_OF_DOUBLES:
+        parameters, moving = self.problem.parameters, self._width
+        if rows.dtype not in _SUMS_OF_DOUBLES:
             return {}
         numbers = [Fraction(value) for value in (*parameters.numbers, *self.start)]
         sizes, most = [abs(value) for value in numbers if value], numpy.abs(rows).max(axis=0)
@@ -276,21 +299,16 @@ class Drift(Statistics):
         state = [Pairs(*column) for column in zip(*(numpy.vstack(word).T for word in words), strict=True)]
         of_number = {number: pairs[k] for k, number in enumerate(numbers)}
         most = [Magnitude(max(float(value), abs(float(own)))) for value, own in zip(most, self.start, strict=True)]
-        changes = {}
+        squares = {}
         for name, value in self.functions.items():
             values = value(parameters.mapped(of_number.__getitem__), state)
             size = float(value(parameters.mapped(Magnitude), most).size)
             drifts = (values[1:] - values[:1]).high
-            changes[name] = Rough(drifts, 2.0**-52 * abs(drifts) + (2.0**-96 * size + _LOST))
-        return changes
-
-    def values(self, y: Sequence[arb]) -> list[arb]:
-        """The drifts of a state of balls, at a working precision of ``bits``."""
-        return [value(self.parameters, y) - self.initial[name] for name, value in self.functions.items()]
+            squares[name] = Rough(drifts, 2.0**-52 * abs(drifts) + (2.0**-96 * size + _LOST)).squared()
+        return squares
 
     def quantities(self) -> dict[Quantity, Running]:
         """The running values by what they are of."""
-        self._take_waiting()
         return {Quantity(DRIFT, name): values for name, values in self.running.items()}
 
 
@@ -314,11 +332,8 @@ ORDER_OF_RUNS = Quantity("observed_order", "runs")
 """Order of a method, by the errors of whole runs at h, h/2, h/4."""
 COMPONENTS = ("omega", "gamma", "along", "across")
 
-Errors = tuple[list[Sums], bool]
-"""Result of :meth:`SolutionError.following`."""
 
-
-class SolutionError(Statistics):
+class SolutionError(StatisticsOfStates):
     """Error of Ω and of γ (largest component), of the state along the flow (phase) and across it (Euclidean), and
     relative: the largest |error|/max(1, |true value|) of a component, which says how many digits are kept.
 
@@ -338,44 +353,22 @@ class SolutionError(Statistics):
         until: float = math.inf,
         name: str = SOLUTION_ERROR,
     ) -> None:
+        super().__init__(problem, (*COMPONENTS, _RELATIVE), keep, 6)
         self.truth = truth
-        self.bits = problem.precision.bits + GUARD_BITS
-        self.keep = frozenset(keep)
         self.threshold = threshold
         self.until = until
         self.name = name
-        self.escape: Fraction | None = None
-        self.running = {part: Running() for part in (*COMPONENTS, _RELATIVE)}
-        self.system = problem.system
-        self.parameters = parameter_balls(problem, self.bits)
+        self._escape: Fraction | None = None
 
-    def __call__(self, time: Fraction, state: Sequence[Any]) -> None:
-        """Take in one native state."""
-        self.take(time, self.following(time, state))
+    @property
+    def escape(self) -> Fraction | None:
+        """The first time at which an error of Ω is beyond the threshold."""
+        self.settle()
+        return self._escape
 
-    def take(self, time: Fraction, errors: Errors | None) -> None:
-        """Take in one state by its :meth:`following`."""
-        if errors is None:
-            return
-        sums, left = errors
-        keep = bool(self.keep) and time in self.keep
-        for running, part in zip(self.running.values(), sums, strict=True):
-            (running.take if self.counts(time) else running.remember)(time, part, keep)
-        if left and self.escape is None:
-            self.escape = time
-
-    @whole_evaluation
-    def following(self, time: Fraction, state: Sequence[Any]) -> Errors | None:
-        """The sums of the errors with this native state, and whether Ω is off by more than the threshold; None where
-        there is no truth.  Nothing is taken in.
-        """
-        truth = self.known(time)
-        if truth is None:
-            return None
-        with working_precision(self.bits):
-            values = self.values(to_balls(state[:6]), truth)
-            sums = [running.following(value) for running, value in zip(self.running.values(), values, strict=True)]
-            return sums, self.left(values[0])
+    def settle(self) -> None:
+        """Take in the states that wait."""
+        summarise([self])
 
     def known(self, time: Fraction) -> Sequence[arb] | None:
         """The true state; None where absent."""
@@ -384,7 +377,7 @@ class SolutionError(Statistics):
     def values(self, y: Sequence[arb], truth: Sequence[arb]) -> list[arb]:
         """The errors of a state of six balls by :data:`COMPONENTS`, and relative, at the working precision."""
         delta = [value - true for value, true in zip(y, truth, strict=True)]
-        flow = self.system.field(self.parameters, truth)
+        flow = self.problem.system.field(self.parameters, truth)
         return [largest(delta[:3]), largest(delta[3:]), *split(delta, flow), relative_error(delta, truth)]
 
     def left(self, omega: arb) -> bool:
@@ -395,12 +388,16 @@ class SolutionError(Statistics):
         """Whether the errors at that time count."""
         return math.isinf(self.until) or abs(float(time)) <= self.until
 
-    @whole_evaluation
     def last(self, rate: Fraction) -> float:
         """The error of the last state that was taken in, at most: of Ω over ``rate``, or of γ, the larger."""
-        with working_precision(self.bits):
-            omega, gamma = (self.running[part].final for part in ("omega", "gamma"))
-            return float(largest((omega / rational(rate), gamma)).abs_upper())
+        omega, gamma = (self.running[part].final for part in ("omega", "gamma"))
+
+        @whole_evaluation
+        def at_most() -> float:
+            with working_precision(self.bits):
+                return float(largest((omega / rational(rate), gamma)).abs_upper())
+
+        return at_most()
 
     def quantities(self) -> dict[Quantity, Running]:
         """``NAME_omega``, ``_gamma``, ``_along``, ``_across`` and ``_relative``."""
@@ -412,7 +409,7 @@ class SolutionError(Statistics):
 
     def restore(self, content: dict[str, Any]) -> None:
         """Go on from that :meth:`content`."""
-        self.escape = None if content["escape"] is None else Fraction(content["escape"])
+        self._escape = None if content["escape"] is None else Fraction(content["escape"])
         super().restore(content)
 
 
@@ -473,6 +470,9 @@ class Scorer(DriftAndError):
     Drift is in the units of each integral, errors of Ω are in 1/time unit, of γ in none.
     """
 
+    drift: Drift
+    error: SolutionError | None
+
     def __init__(
         self,
         problem: Problem,
@@ -483,55 +483,23 @@ class Scorer(DriftAndError):
         until: float = math.inf,
         name: str = SOLUTION_ERROR,
     ) -> None:
-        self._drift = Drift(problem, problem.integrals(), keep)
-        self.truth, self.keep, self.system = truth, self._drift.keep, problem.system
-        self._error: SolutionError | None = None
+        self.truth = truth
+        self.drift = Drift(problem, problem.integrals(), keep)
+        self.error = None
         if not isinstance(truth, str):
-            self._error = SolutionError(problem, truth, keep, threshold, until, name)
-        self._waiting: list[tuple[Fraction, Any]] | None = []
-        self.summarised = False
-
-    @property
-    def drift(self) -> Drift:  # type: ignore[override]
-        """Of all samples so far."""
-        summarise([self])
-        return self._drift
-
-    @property
-    def error(self) -> SolutionError | None:  # type: ignore[override]
-        """Of all samples so far; None without a reference."""
-        summarise([self])
-        return self._error
-
-    @property
-    def waits(self) -> int:
-        """How many samples are not in the running values."""
-        return 0 if self.summarised else len(self._waiting or ())
+            self.error = SolutionError(problem, truth, keep, threshold, until, name)
 
     def __call__(self, time: Fraction, state: Sequence[Any]) -> None:
         """Take in one native state."""
-        if self._waiting is not None and not self.summarised and len(self._waiting) < _MOST_AT_ONCE:
-            self._waiting.append((time, state.copy() if isinstance(state, numpy.ndarray) else tuple(state)))
-        else:
-            self.one_by_one()
-            self._take(time, state)
+        self.drift(time, state)
+        if self.error is not None:
+            self.error(time, state)
 
     def one_by_one(self) -> None:
-        """Take in the samples that wait one after the other, and all that follow at once."""
-        if self._waiting is None:
-            return
-        waiting, self._waiting, self.summarised = self._waiting, None, False
-        self._drift.running = {name: Running() for name in self._drift.running}
-        if self._error is not None:
-            self._error.running = {name: Running() for name in self._error.running}
-            self._error.escape = None
-        for time, state in waiting:
-            self._take(time, state)
-
-    def _take(self, time: Fraction, state: Sequence[Any]) -> None:
-        self._drift.take(time, self._drift.following(state))
-        if self._error is not None:
-            self._error(time, state)
+        """Take in the states that wait, and all that follow, by balls alone."""
+        self.drift.one_by_one()
+        if self.error is not None:
+            self.error.one_by_one()
 
     def take(self, times: Iterable[Fraction], states: Iterable[Sequence[Any]]) -> None:
         """Take in an array of native states, one at each of the exact times."""
@@ -541,24 +509,23 @@ class Scorer(DriftAndError):
     def content(self) -> dict[str, Any]:
         """The sums so far, as plain text and integers, exact."""
         self.one_by_one()
-        return {"drift": self._drift.content()} | ({"error": self._error.content()} if self._error else {})
+        return {"drift": self.drift.content()} | ({"error": self.error.content()} if self.error else {})
 
     def restore(self, content: dict[str, Any]) -> None:
         """Go on from that :meth:`content`."""
         self.one_by_one()
-        self._drift.restore(content["drift"])
-        if self._error is not None:
-            self._error.restore(content["error"])
+        self.drift.restore(content["drift"])
+        if self.error is not None:
+            self.error.restore(content["error"])
 
 
 # Many samples at once.
 #
-# The drifts of a sample and its distance from the truth are balls.  What follows from them is worked out for all
-# samples in doubles with proven errors: these tell which few samples may be the largest, of which the balls are
-# evaluated, and what the squares add up to.  Where that leaves a digit of a report open, all are taken one by one.
+# The distances of samples from the truth are balls.  What follows from them is worked out for all samples in doubles
+# with proven errors: the squares that :meth:`Running.following_all` takes.
 
 
-_FEW, _MOST_AT_ONCE = 24, 4096
+_FEW = 24
 _ROUNDING, _ROOM, _UNDERFLOW = 2.0**-52, 1 + 2.0**-48, 1e-300
 
 
@@ -618,6 +585,7 @@ def _sum(parts: Iterable[Rough]) -> Rough:
     return reduce(Rough.__add__, parts)
 
 
+@numpy.errstate(all="ignore")
 def _largest_and_sum(squares: Rough) -> tuple[list[int], arb]:
     """Which of them may be the largest, and their sum."""
     largest = numpy.flatnonzero(squares.value + squares.error >= (squares.value - squares.error).max()).tolist()
@@ -629,112 +597,72 @@ def _largest_and_sum(squares: Rough) -> tuple[list[int], arb]:
 
 
 class _Samples:
-    """The samples that wait for a scorer; known: those that have a truth, by their numbers."""
+    """The states that waited for errors, where there is a truth."""
 
-    def __init__(self, scorer: Scorer) -> None:
-        self.drift, self.error = scorer._drift, scorer._error
-        self.field: Any = scorer.system.field
-        self.times, self.states = zip(*(scorer._waiting or ()), strict=True)
-        self.truths = [None if self.error is None else self.error.known(time) for time in self.times]
-        self.known = [i for i, truth in enumerate(self.truths) if truth is not None]
-        self.kept = {i for i, time in enumerate(self.times) if time in scorer.keep} if scorer.keep else set()
-        self.drifts, self.deltas = self._balls()
-        self.errors = cache(self._errors)
+    def __init__(self, error: SolutionError) -> None:
+        waiting, error._waiting = error._waiting, []
+        known = [(*sample, truth) for sample in waiting if (truth := error.known(sample[0])) is not None]
+        self.error, self.states, self.truths = error, [state for _, state, _ in known], [truth for *_, truth in known]
+        self.times = [time for time, *_ in known]
+        self.kept = error._kept(self.times)
+        self.counted = [i for i, time in enumerate(self.times) if error.counts(time)]
 
-    @whole_evaluation
-    def _balls(self) -> tuple[list[list[arb]], list[list[arb]]]:
-        with working_precision(self.drift.bits):
-            states = [to_balls(state) for state in self.states]
-            pairs = [(states[i], self.truths[i] or ()) for i in self.known]
-            deltas = [[value - true for value, true in zip(y, truth, strict=False)] for y, truth in pairs]
-            return [self.drift.values(y) for y in states], deltas
+    def deltas(self) -> list[list[arb]]:
+        """The differences from the truth."""
+        with working_precision(self.error.bits):
+            pairs = zip(map(to_balls, self.states), self.truths, strict=True)
+            return [[value - true for value, true in zip(y, truth, strict=True)] for y, truth in pairs]
 
     @whole_evaluation
-    def _errors(self, index: int) -> list[arb]:
-        error, truth = self.error, self.truths[index]
-        assert error is not None
-        assert truth is not None
+    def following(self, squares: Sequence[Rough] | None) -> tuple[list[tuple[Sums, dict[Fraction, arb]]], int | None]:
+        """The sums of each error with all of these states, and the values to keep; and which is the first beyond the
+        threshold.  Nothing is taken in.
+        """
+        error, results = self.error, []
         with working_precision(error.bits):
-            return error.values(to_balls(self.states[index][:6]), truth)
-
-    def fill(self, squares: Sequence[Rough]) -> bool:
-        """Whether all digits of the statistics are decided, which are then in the running values.
-
-        squares: of the errors, where there is a truth.
-        """
-        every = range(len(self.times))
-        drifts = zip(self.drift.running.values(), Rough.of(self.drifts).squared(), strict=True)  # type: ignore[call-overload]
-        done = all(
-            self._filled(running, part, every, every, lambda i, j=j: self.drifts[i][j])  # type: ignore[misc]
-            for j, (running, part) in enumerate(drifts)
-        )
-        error = self.error
-        if error is None or not done:
-            return done
-        counted = [place for place, i in enumerate(self.known) if error.counts(self.times[i])]
-        for j, (running, part) in enumerate(zip(error.running.values(), squares, strict=True)):
-            if not self._filled(running, part, self.known, counted, lambda i, j=j: self.errors(i)[j]):  # type: ignore[misc]
-                return False
-        if error.threshold is not None:
-            beyond = squares[0].value + squares[0].error >= float(error.threshold) ** 2 / _ROOM
-            leaving = (self.known[place] for place in numpy.flatnonzero(beyond).tolist())
-            error.escape = next((self.times[i] for i in leaving if error.left(self.errors(i)[0])), None)
-        return True
-
-    def _filled(
-        self,
-        running: Running,
-        squares: Rough,
-        numbers: Sequence[int],
-        counted: Sequence[int],
-        value: Callable[[int], arb],
-    ) -> bool:
-        """Whether the statistics of one quantity are decided.  numbers: of the samples of ``squares``; counted: places
-        among them; value: of the sample with a number.
-        """
-        running.kept = {self.times[i]: abs(value(i)) for i in numbers if i in self.kept}
-        running.count = len(counted)
-        if not counted:
-            return True
-        part = squares[numpy.array(counted)]
-        largest, running.squares = _largest_and_sum(part)
-        running.maximum = reduce(larger, (abs(value(numbers[counted[place]])) for place in largest), arb(0))
-        running.final = abs(value(numbers[counted[-1]]))
-        return decided(root(running.squares / running.count))
+            values = cache(lambda index: error.values(to_balls(self.states[index]), self.truths[index]))
+            for j, running in enumerate(error._running.values()):
+                part = None if squares is None else squares[j][numpy.array(self.counted, int)]
+                sums = running.following_all(self.counted, lambda i, j=j: values(i)[j], part)  # type: ignore[misc]
+                results.append((sums, {self.times[i]: abs(values(i)[j]) for i in self.kept}))
+            if error.threshold is None:
+                return results, None
+            below = numpy.zeros(len(self.times), bool)
+            if squares is not None:
+                below = squares[0].value + squares[0].error < float(error.threshold) ** 2 / _ROOM
+            return results, next((i for i in numpy.flatnonzero(~below).tolist() if error.left(values(i)[0])), None)
 
 
-def summarise(scorers: Sequence[Scorer]) -> None:
-    """Bring the running values of scorers up to all their samples; of one motion, whose roundings may differ."""
-    waiting = [scorer for scorer in scorers if scorer.waits]
-    count, kept = sum(scorer.waits for scorer in waiting), sum(len(scorer.keep) for scorer in waiting)
-    if count >= max(_FEW, 2 * kept) and _at_once([_Samples(scorer) for scorer in waiting]):
-        for scorer in waiting:
-            scorer.summarised = True
-    for scorer in waiting:
-        if not scorer.summarised:
-            scorer.one_by_one()
+def summarise(errors: Iterable[SolutionError]) -> None:
+    """Take in the states that wait for errors of one motion, whose roundings may differ."""
+    samples = [_Samples(error) for error in errors if error._waiting]
+    count, kept = sum(len(one.times) for one in samples), sum(len(one.kept) for one in samples)
+    squares, first = None, 0
+    if count >= max(_FEW, 2 * kept) and all(one.error.at_once for one in samples):
+        squares = _error_squares(samples)
+    for one in samples:
+        end = first + len(one.times)
+        sums, beyond = one.following(squares and [part[first:end] for part in squares])
+        for running, (part, values) in zip(one.error._running.values(), sums, strict=True):
+            running.take_all(part, len(one.counted), values)
+        if beyond is not None and one.error._escape is None:
+            one.error._escape = one.times[beyond]
+        first = end
 
 
 @whole_evaluation
-def _at_once(samples: Sequence[_Samples]) -> bool:
-    ends = numpy.cumsum([len(one.known) for one in samples])
-    with numpy.errstate(all="ignore"), working_precision(samples[0].drift.bits):
-        squares = _error_squares(samples) if ends[-1] else [Rough(numpy.zeros(0), numpy.zeros(0))] * 5
-        parts = ([part[end - len(one.known) : end] for part in squares] for one, end in zip(samples, ends, strict=True))
-        return all(one.fill(part) for one, part in zip(samples, parts, strict=True))
-
-
+@numpy.errstate(all="ignore")
 def _error_squares(samples: Sequence[_Samples]) -> list[Rough]:
     """The squares of the errors that :meth:`SolutionError.values` gives, of all samples that have a truth."""
-    delta = Rough.of([row for one in samples for row in one.deltas])
-    truth = Rough.of([one.truths[i] or () for one in samples for i in one.known])
-    owners = numpy.repeat(numpy.arange(len(samples)), [len(one.known) for one in samples])
+    delta = Rough.of([row for one in samples for row in one.deltas()])
+    truth = Rough.of([row for one in samples for row in one.truths])
+    owners = numpy.repeat(numpy.arange(len(samples)), [len(one.times) for one in samples])
     numbers: list[list[arb]] = [[] for _ in samples]
     for one, row in zip(samples, numbers, strict=True):
-        one.drift.parameters.mapped(row.append)
+        one.error.parameters.mapped(row.append)
     columns = iter(Rough.of(numbers)[:, owners])
-    parameters = samples[0].drift.parameters.mapped(lambda _: next(columns))
-    flow = samples[0].field(parameters, [truth[k] for k in range(6)])
+    parameters = samples[0].error.parameters.mapped(lambda _: next(columns))
+    flow: Any = samples[0].error.problem.system.field(parameters, [truth[k] for k in range(6)])
     squares = [delta[k].squared() for k in range(6)]
     share = _sum(delta[k] * flow[k] for k in range(6)) / _sum(rate.squared() for rate in flow)
     along = _sum((share * rate).squared() for rate in flow)
