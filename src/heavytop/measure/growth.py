@@ -156,6 +156,8 @@ def law(ensemble: Ensemble) -> Law:
         return unresolved
     growth, first, slope, (low, high), bend = fit
     logs = numpy.log(rms[-1]) + numpy.log(resampled(starts) @ shares[:, -1]) / 2
+    least, most = numpy.exp(_interval(logs, starts))
+    lift, n, order = (most**2 - least**2) ** 0.5, times[-1] / ensemble.step, ensemble.accumulates
     return Law(
         growth,
         starts,
@@ -164,17 +166,10 @@ def law(ensemble: Ensemble) -> Law:
         high,
         first=f"{first:.6g}",
         last=f"{times[-1]:.6g}",
-        detects=None if growth == "exponential" else _detects(ensemble, times[-1], _interval(logs, starts)),
+        detects=None if growth == "exponential" else f"{lift * order / n**order / ensemble.size:.3g}",
         lost_at=_lost(ensemble, growth, times, rms),
         bend=bend,
     )
-
-
-def _detects(ensemble: Ensemble, last: float, logs: Interval) -> str:
-    """As :func:`law` says, from the interval of log RMS at the ``last`` time."""
-    low, high = numpy.exp(logs)
-    n, order = last / ensemble.step, ensemble.accumulates
-    return f"{(high**2 - low**2) ** 0.5 * order / n**order / ensemble.size:.3g}"
 
 
 def _usable(ensemble: Ensemble, errors: Array) -> Array:

@@ -304,7 +304,11 @@ def compute(
     watcher = _Watcher(problem, integrals, frozenset(wanted), reached or (lambda time: None), attitude, setup)
     samples = times if watcher.angles is None else watcher.angles.samples(times)
     if reached is not None and described(integrator).streams:
-        on_the_way = {exact(number(time, precision)) for time in _on_the_way(problem, times[-1])}
+        # samples change no bit of a run, and there are far fewer than steps
+        steps, end = expected_steps(problem, times[-1]), times[-1]
+        evenly = [end * i / _PARTS for i in range(1, _PARTS)] if steps > _STEPS_A_PART * _PARTS else []
+        early = [end / 2**n for n in range(1, steps.bit_length())]
+        on_the_way = {exact(number(time, precision)) for time in (*evenly, *early)}
         samples = sorted({*samples, *(on_the_way - wanted.keys())}, key=abs)
     options = (options or {}) | ({} if xi is None else {"xi": xi})
     propagate = registry.watched(integrator, options, watcher)
@@ -324,13 +328,6 @@ def compute(
     reached_times = [str(wanted[time]) for time, _ in watcher.kept]
     states, drift = [line[:6] for line in texts], watcher.drift.metrics()
     return Motion(top, start, run, states, drift, attitudes, angles, reached_times, outputs)
-
-
-def _on_the_way(problem: Problem, end: Fraction) -> list[Fraction]:
-    """Times that say how far a run has come; samples change no bit of it, and there are far fewer than steps."""
-    steps = expected_steps(problem, end)
-    evenly = [end * i / _PARTS for i in range(1, _PARTS)] if steps > _STEPS_A_PART * _PARTS else []
-    return [*evenly, *(end / 2**n for n in range(1, steps.bit_length()))]
 
 
 @whole_evaluation

@@ -214,19 +214,15 @@ def explains(rounding: Rounding, error: float) -> bool:
     return _PART * rounding.error <= error <= EXPLAINS * rounding.error
 
 
-def _to_decimals(value: Fraction, digits: int) -> Fraction:
-    return Fraction(round(value * 10**digits), 10**digits)
-
-
-def _to_significant(value: Fraction, digits: int) -> Fraction:
-    return Fraction(decimal_text(value, digits))
-
-
 def _all(numbers: Sequence[Fraction], precision: Precision) -> Iterator[Rounding]:
     worst = float(min(Fraction(1), max(map(abs, numbers))))
     written: list[Callable[[Fraction], Fraction]] = [lambda value: value]
     single = Rounding("single", _SINGLE, worst * 2.0**-_SINGLE)
-    for kind, form, scale in (("decimals", _to_decimals, 0.5), ("significant", _to_significant, 5 * worst)):
+    forms: dict[str, tuple[Callable[..., Fraction], float]] = {
+        "decimals": (lambda value, digits: Fraction(round(value * 10**digits), 10**digits), 0.5),
+        "significant": (lambda value, digits: Fraction(decimal_text(value, digits)), 5 * worst),
+    }
+    for kind, (form, scale) in forms.items():
         for digits in range(1, precision.digits - _SPARE):
             if all(round_to(form(value, digits), precision.bits) == value for value in numbers):
                 rounding = Rounding(kind, digits, scale * 10.0**-digits)

@@ -276,15 +276,12 @@ def compiled(arithmetic: Arithmetic, system: System, attitude: bool) -> float:
 
 def compiled_lanes(system: System) -> float:
     """The seconds that compiling the code of eight lanes took; it is checked then as :meth:`Arithmetic.make` does."""
-    return _once((eight_lane_run.Eight, system.name), lambda: _make_lanes(system))
 
+    def make() -> float:
+        seconds, one = eight_lane_run.machine(system).seconds, eight_lane_run.OneOfEight
+        check(system, False, lambda scaled: one(scaled, _ALLOWED, _ALLOWED.order - 1), double_double_run.BITS)
+        check(system, False, lambda scaled: one(scaled, _SPLIT_ALLOWED, 30), _SPLIT_BITS)
+        check(system, False, lambda scaled: one(scaled, _PLAIN, 3), _PLAIN_BITS)
+        return seconds
 
-def _make_lanes(system: System) -> float:
-    def begin(schedule: OrderSchedule, low_order: int) -> Callable[[Scaled], Steps]:
-        return lambda scaled: eight_lane_run.OneOfEight(scaled, schedule, low_order)
-
-    seconds = eight_lane_run.machine(system).seconds
-    check(system, False, begin(_ALLOWED, _ALLOWED.order - 1), double_double_run.BITS)
-    check(system, False, begin(_SPLIT_ALLOWED, 30), _SPLIT_BITS)
-    check(system, False, begin(_PLAIN, 3), _PLAIN_BITS)
-    return seconds
+    return _once((eight_lane_run.Eight, system.name), make)

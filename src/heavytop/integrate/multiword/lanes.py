@@ -7,7 +7,7 @@ among others with a larger one; so its bits depend on nothing but itself.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
@@ -232,26 +232,22 @@ def propagate_multiword_ensemble(
     if arithmetic is not None and first.xi is None and work.moves:
         run = partial(_in_lanes, work, arithmetic, tolerance, compiled_lanes(first.system))
         return in_threads(run, work, threads, LANES, observer, finished)
-    return in_threads(partial(_one_by_one, work, tolerance), work, threads, 1, observer, finished)
+    return in_threads(lambda: _alone(work, tolerance, iter(work.take, None)), work, threads, 1, observer, finished)
 
 
 def _in_lanes(work: Work, arithmetic: DoubleDouble, tolerance: Fraction | None, seconds: float) -> None:
     """One thread of lanes, and afterwards those that need another arithmetic."""
     lanes = WordsLanes(work, arithmetic, tolerance, seconds)
     lanes.run()
-    while lanes.others:
-        _alone(work, tolerance, *lanes.others.popleft())
+    _alone(work, tolerance, lanes.others)
 
 
-def _one_by_one(work: Work, tolerance: Fraction | None) -> None:
-    """One thread of single runs."""
-    while taken := work.take():
-        _alone(work, tolerance, *taken)
-
-
-def _alone(work: Work, tolerance: Fraction | None, index: int, problem: Problem) -> None:
-    observer = partial(work.observe, index) if work.observed else None
-    work.finish(index, integrate_to_samples(problem, work.targets, tolerance, work.step_limit, observer, work.check))
+def _alone(work: Work, tolerance: Fraction | None, problems: Iterable[tuple[int, Problem]]) -> None:
+    """Single runs, one after the other."""
+    for index, problem in problems:
+        observer = partial(work.observe, index) if work.observed else None
+        run = integrate_to_samples(problem, work.targets, tolerance, work.step_limit, observer, work.check)
+        work.finish(index, run)
 
 
 # Many short motions of heavy tops at the same times, as arrays: double-double in lanes, no exact number per motion.
@@ -337,17 +333,14 @@ class _Grid:
         larger = []
         for first in range(0, len(ordered), LANES):
             eights = ordered[numpy.minimum(numpy.arange(first, first + LANES), len(ordered) - 1)]
-            self._eight(eight, eights, step_limit)
+            words = numpy.zeros((12, LANES))
+            words[:6] = self.begin[eights].T
+            eight.begin(slice(None), words, self.constants[:, :, eights], True, step_limit)
+            for sample, targets in enumerate(self.times[eights].T):
+                self.samples[eights, sample] = eight.reach_all(targets).T
             larger += eights[(eight.flags & (LARGER_N0 | NON_FINITE | TOO_SMALL)) == LARGER_N0].tolist()
             self.good[eights] = (eight.flags == 0) & (eight.clock[LEFT] > 0)
         return numpy.unique(numpy.array(larger, int))
-
-    def _eight(self, eight: Eight, eights: Any, step_limit: int) -> None:
-        words = numpy.zeros((12, LANES))
-        words[:6] = self.begin[eights].T
-        eight.begin(slice(None), words, self.constants[:, :, eights], True, step_limit)
-        for sample, targets in enumerate(self.times[eights].T):
-            self.samples[eights, sample] = eight.reach_all(targets).T
 
     def _states(self) -> Pairs:
         """The samples in the units of the problems; NaN where they are not good."""
