@@ -366,8 +366,9 @@ def _against_geometry(body: MassProperties) -> Iterator[Slip]:
     lighter, size = body, _size(replace(body, six=six_of(body.geometry), mass=Fraction(1), at_pivot=False))
     if 5 * float(body.mass) / size**3 > _DENSEST:
         lighter = replace(body, mass=body.mass / 1000)
-    ways = (_conjugated(body), _mends(body), _about_pivot(body), _in_units(lighter), _of_axes(body))
-    for slip, mended in chain(*ways):
+    less = six_of(minus(rows(body.six), steiner(body.mass, body.centre)))
+    pivot = _mend(body, "about_pivot", "The tensor is about the pivot, and was read as about the centre of mass.", less)
+    for slip, mended in chain(_conjugated(body), _mends(body), [pivot], _in_units(lighter), _of_axes(body)):
         if _from_shape(mended) * _ROUND < min(apart, Fraction(1, 5)):
             yield _of_mass(slip, mended, body)
 
@@ -380,11 +381,6 @@ def _conjugated(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
     twice = multiplied(multiplied(axes, multiplied(axes, rows(body.six))), transposed(multiplied(axes, axes)))
     six = [round_to(value, _SHOWN_BITS) for value in six_of(twice)]
     yield _mend(body, "conjugate_axes", "The rotation of the principal axes is the inverse of what was meant.", six)
-
-
-def _about_pivot(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
-    less = six_of(minus(rows(body.six), steiner(body.mass, body.centre)))
-    yield _mend(body, "about_pivot", "The tensor is about the pivot, and was read as about the centre of mass.", less)
 
 
 def _in_units(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:

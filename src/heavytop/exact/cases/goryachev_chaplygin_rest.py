@@ -177,15 +177,15 @@ class RestMotion:
         tilt, turned = speed / c, level.turned()
         at_rest = cls(level, h, a, c, speed, tilt, turned[4], turned[5], (tilt, tilt), functions, arb(0))
         if not any(level.omega):
-            return at_rest._with_shares(*_parted(tilt, turned[4], turned[5]))
+            # e − γ2 and e + γ2 of e² = γ2² + γ3², without cancellation
+            larger = tilt + abs(turned[4])
+            smaller = turned[5] * turned[5] / larger
+            return replace(at_rest, shares=(larger, smaller) if turned[4] < 0 else (smaller, larger))
         tangents, origin = at_rest._passed(above, below)
-        shares = [2 * tilt * p / (tangents[0] + tangents[1]) for p in tangents]
-        upright = (shares[0] * shares[1]).sqrt()
-        moving = replace(at_rest, across=(shares[1] - shares[0]) / 2, origin=origin)._with_shares(*shares)
+        first, second = (2 * tilt * p / (tangents[0] + tangents[1]) for p in tangents)
+        upright = (first * second).sqrt()
+        moving = replace(at_rest, across=(second - first) / 2, origin=origin, shares=(first, second))
         return _the_one(level, [replace(moving, upright=sign * upright) for sign in (1, -1)])
-
-    def _with_shares(self, first: arb, second: arb) -> RestMotion:
-        return replace(self, shares=(first, second))
 
     def _passed(self, above: arb, below: arb) -> tuple[list[arb], arb]:
         """p1 and p2 at the start, and √a t/2 since the rest; above, below: a + h and a − h."""
@@ -354,10 +354,3 @@ class UprightMotion:
 
 
 Signed = TypeVar("Signed", RestMotion, UprightMotion)
-
-
-def _parted(tilt: arb, across: arb, upright: arb) -> tuple[arb, arb]:
-    """(e − γ2, e + γ2) of e² = γ2² + γ3², without cancellation."""
-    larger = tilt + abs(across)
-    smaller = upright * upright / larger
-    return (larger, smaller) if across < 0 else (smaller, larger)

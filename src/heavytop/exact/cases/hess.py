@@ -138,11 +138,6 @@ class HessLevel:
         roots: Any = self.cubic().complex_roots()
         return sorted((root.real for root, _ in roots), key=midpoint)
 
-    def in_plane(self, vector: tuple[Fraction, ...]) -> tuple[arb, arb]:
-        """The components along e_x and e_y."""
-        a, _, c = self.moment
-        return ball(c * vector[0] - a * vector[2]) / ball(self.moment_square).sqrt(), ball(vector[1])
-
 
 _LEAST = 256
 _MOST_TERMS = 1 << 14
@@ -230,7 +225,8 @@ class HessMotion:
         height = ball(level.height)
         speed = ball(dot(level.moment, cross(level.gamma, level.omega)))
         phase = gap.phase(height, speed * gap.density(height))
-        x, y = level.in_plane(level.angular_momentum)
+        (a, _, c), momentum = level.moment, level.angular_momentum
+        x, y = ball(c * momentum[0] - a * momentum[2]) / size, ball(momentum[1])
         length = (2 * (energy - height)).sqrt()
         start = arb_mat([[length + x], [y]]) if x > 0 else arb_mat([[y], [length - x]])
         spinor = matrix.inverse(phase) * start

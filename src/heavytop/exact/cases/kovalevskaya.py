@@ -226,11 +226,6 @@ class AbelMotion:
             velocity = self._velocity(self.moving(phases), turns)
         return self.start.state(velocity, length)
 
-    def exponents(self) -> list[arb]:
-        """The mean rate of X of a variable that tends to a double root, in a list of its own; else nothing."""
-        open_ones = [k for k, variable in enumerate(self.variables) if isinstance(variable, Approach)]
-        return [abs(self.line.mean_rates()[k]) * ball(self.level.rate) for k in open_ones]
-
     def approach(self, phases: Sequence[arb], turns: Sequence[int]) -> arb | None:
         """(log q √((w1 − e)(w2 − e)))' in t' where one variable tends to a double root e; None where none does.
 
@@ -544,10 +539,11 @@ class Kovalevskaya(WithBearing, ClosedForm):
 
         def evaluate(working: int) -> list[arb]:
             motion = _motion(self)
-            exponents = motion.exponents() if isinstance(motion, AbelMotion) else []
-            if not exponents:
-                raise NotInClass("The motion is not asymptotic.", "Only asymptotic ones have an exponent.")
-            return exponents
+            if isinstance(motion, AbelMotion):
+                for k, variable in enumerate(motion.variables):
+                    if isinstance(variable, Approach):  # the mean rate of its X
+                        return [abs(motion.line.mean_rates()[k]) * ball(motion.level.rate)]
+            raise NotInClass("The motion is not asymptotic.", "Only asymptotic ones have an exponent.")
 
         return to_bits(evaluate, bits)[0]
 

@@ -300,17 +300,14 @@ class HyperellipticCurve:
 def _integrals(places: Any, rest: Sequence[tuple[Any, Any]], factor: Any, lower: Any, upper: Any) -> Pair:
     """factor times the integrals of Π rsqrt and w Π rsqrt over the straight way; rest: (root, value of w − root)."""
 
-    def integrand(weight: int) -> Any:
-        def value(s: acb, analytic: bool) -> acb:
-            w = places(s)
-            product = acb(1)
-            for root, scale in rest:
-                product *= ((w - root) / scale).rsqrt(analytic=analytic)
-            return product * w if weight else product
+    def integrand(weight: int, s: acb, analytic: bool) -> acb:
+        w, product = places(s), acb(1)
+        for root, scale in rest:
+            product *= ((w - root) / scale).rsqrt(analytic=analytic)
+        return product * w if weight else product
 
-        return value
-
-    return factor * acb.integral(integrand(0), lower, upper), factor * acb.integral(integrand(1), lower, upper)
+    one, two = (factor * acb.integral(partial(integrand, weight), lower, upper) for weight in (0, 1))
+    return one, two
 
 
 def _between(roots: Sequence[acb], k: int) -> Pair:
@@ -344,16 +341,13 @@ def _from_root(roots: Sequence[acb], near: int, w: arb, y: arb) -> Pair:
 def _from_infinity(roots: Sequence[acb], w: arb, y: arb) -> Pair:
     """∫ from ∞ for |w| > |e_j|: w/s² in the place of w."""
 
-    def integrand(power: int) -> Any:
-        def value(s: acb, analytic: bool) -> acb:
-            result = s**power
-            for root in roots:
-                result *= ((w - root * s * s) / (w - root)).rsqrt(analytic=analytic)
-            return result
+    def integrand(power: int, s: acb, analytic: bool) -> acb:
+        result = s**power
+        for root in roots:
+            result *= ((w - root * s * s) / (w - root)).rsqrt(analytic=analytic)
+        return result
 
-        return value
-
-    one, two = (acb.integral(integrand(power), 0, 1) for power in (2, 0))
+    one, two = (acb.integral(partial(integrand, power), 0, 1) for power in (2, 0))
     return -2 * w * one / y, -2 * w * w * two / y
 
 

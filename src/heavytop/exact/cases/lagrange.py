@@ -354,12 +354,13 @@ class Reduced:
 
     @classmethod
     def of(cls, top: HeavyTop, start: State) -> Self:
-        """From a top with I1 = I2 and P c = 0; a rotor lies along axis 3."""
+        """From a top with I1 = I2, P c = 0 and P r ≠ 0; a rotor lies along axis 3."""
         i3 = top.inertia[2]
         n1, n2 = (n / i3 for n in top.moment[:2])
-        size = _power_of_two(max(map(abs, start.gamma)))
+        size = Fraction(2) ** exponent(max(map(abs, start.gamma)))
         rotor = top.rotor[2] / i3 if top.rotor else Fraction(0)
-        rate = _power_of_two(max(*map(abs, start.omega), abs(rotor), _root_of_two(max(abs(n1), abs(n2)) * size)))
+        pull = Fraction(2) ** (exponent(max(abs(n1), abs(n2)) * size) // 2)
+        rate = Fraction(2) ** exponent(max(*map(abs, start.omega), abs(rotor), pull))
         (o1, o2, o3), (g1, g2, g3) = start.omega, start.gamma
         lift = size / rate**2
         return cls(
@@ -413,13 +414,3 @@ class Reduced:
 def polynomial(*coefficients: Fraction) -> fmpq_poly:
     """The polynomial with these coefficients of 1, w, w², ..."""
     return fmpq_poly([rational(c) for c in coefficients])
-
-
-def _power_of_two(value: Fraction) -> Fraction:
-    """A power of two of about the size of ``value`` ≥ 0; 1 for 0."""
-    return Fraction(2) ** exponent(value) if value else Fraction(1)
-
-
-def _root_of_two(value: Fraction) -> Fraction:
-    """A power of two of about the size of √value; 0 for 0."""
-    return Fraction(2) ** (exponent(value) // 2) if value else Fraction(0)
