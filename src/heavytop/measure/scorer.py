@@ -54,7 +54,9 @@ _RELATIVE = "relative"
 DRIFT = "drift"
 """The name of the quantity; its components are the first integrals."""
 _ROWS = 1024
-"""States wait until they are so many, and are evaluated as arrays."""
+"""States wait until they are so many."""
+_MANY = 128
+"""Drifts of fewer states take less time as balls than as arrays."""
 _SUMS_OF_DOUBLES = numpy.dtype(float), numpy.dtype(numpy.longdouble)
 _RANGE, _LOST = (1e-40, 1e40), 1e-170
 """Of numbers in this range, or 0, an integral loses at most that by underflow: 2^-1070 an operation, times 1e120."""
@@ -263,7 +265,7 @@ class Drift(StatisticsOfStates):
     def _following(self, states: Any, times: Sequence[Fraction]) -> list[tuple[Sums, dict[Fraction, arb]]]:
         """The sums of each drift with all of these states, and the values to keep; nothing is taken in."""
         kept, squares = self._kept(times), dict[str, Rough]()
-        if self.at_once and len(states) >= max(_FEW, 2 * len(kept)) and self.problem.precision.bits <= EXTENDED.bits:
+        if self.at_once and len(states) >= max(_MANY, 2 * len(kept)) and self.problem.precision.bits <= EXTENDED.bits:
             squares = self._squares(numpy.asarray(states)[:, : self._width])
         with working_precision(self.bits):
             balls = cache(lambda index: to_balls(states[index]))

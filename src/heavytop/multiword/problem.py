@@ -124,7 +124,11 @@ class Scaled:
         sizes = [rate] * 3 + [gamma] * 3 + ([_power_above(max(map(abs, y[6:])))] * 3 if len(y) == 9 else [])
         scaled = constants.with_linear(gamma / rate**2, 1 / rate)
         state = tuple(value / size for value, size in zip(y, sizes, strict=True))
-        return cls(system, scaled, state, rate, tuple(sizes), _rests(system, p, y))
+        omega = system.angular_velocity(p, y[:6])
+        # most motions turn γ, which two products show
+        turning = any(any(cross(vector, omega)) for vector in (y[3:6], y[6:]) if vector)
+        rest = not turning and not any(system.field(p, y[:6]))
+        return cls(system, scaled, state, rate, tuple(sizes), rest)
 
     @property
     def exponents(self) -> tuple[int, ...]:
@@ -134,13 +138,6 @@ class Scaled:
     def back(self, state: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
         """A state in the units of the problem."""
         return tuple(value * size for value, size in zip(state, self.sizes, strict=True))
-
-
-def _rests(system: System, p: Parameters, y: tuple[Fraction, ...]) -> bool:
-    """Whether the derivative is exactly 0; most motions turn γ, which two products show."""
-    omega = system.angular_velocity(p, y[:6])
-    turning = any(any(cross(vector, omega)) for vector in (y[3:6], y[6:]) if vector)
-    return not turning and not any(system.field(p, y[:6]))
 
 
 def _rate(

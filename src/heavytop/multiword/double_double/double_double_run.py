@@ -128,7 +128,10 @@ class Floating(ResumableRun):
         self.machine, self.layout = machine(problem.system, attitude, processor), dd.layout_of(problem.system, attitude)
         self.problem, self.forwards = problem, forwards
         self.steps = 0
-        self.words = _state_words(problem.state, self.layout)
+        self.words = doubles(self.layout.state)
+        self.words[self.layout.units :] = FIRST_UNITS
+        for offset, value in zip(PLACES, problem.state, strict=False):
+            self.words[offset], self.words[offset + 8] = split(value)
         self.clock, self.counts = doubles(dd.CLOCK), numpy.zeros(dd.COUNTS, numpy.int64)
         self.clock[dd.SIGN] = 1.0 if forwards else -1.0
         self.clock[dd.ROOM] = schedule.room
@@ -236,15 +239,6 @@ class Floating(ResumableRun):
         self.clock[[dd.TIME, dd.TIME_LOW]] = words[:2]
         self.words[: len(words) - 2] = words[2:]
         self.steps = steps
-
-
-def _state_words(state: tuple[Fraction, ...], layout: Layout) -> Doubles:
-    words = doubles(layout.state)
-    words[layout.units :] = FIRST_UNITS
-    for index, value in enumerate(state):
-        offset = index if index < 6 else 16 + index - 3
-        words[offset], words[offset + 8] = split(value)
-    return words
 
 
 def _exact_state(words: Doubles, size: int) -> tuple[Fraction, ...]:

@@ -77,23 +77,19 @@ def spread(problem: Scaled) -> int:
     coefficients = (c for vector in problem.coefficients.vectors for row in vector for c in row if c)
     if all(problem.state[:6]) or max(small, *map(_below, coefficients)) <= TINY_BITS // 2:
         return small
-    grown = max(map(_below, _from_nothing(problem)), default=0)
+    # the largest of the first Taylor coefficients of each component of Ω and γ that is 0 at the start and then not
+    series, born = [problem.state], dict.fromkeys((k for k in range(6) if not problem.state[k]), Fraction(0))
+    while len(series) <= _FIRST_ORDERS and any(value < _SMALL for value in born.values()):
+        rates = series_rates(problem.system, problem.coefficients, series)
+        series.append(tuple(rate / len(series) for rate in rates))
+        born = {k: max(value, abs(series[-1][k])) for k, value in born.items()}
+    grown = max((_below(value) for value in born.values() if value), default=0)
     return max(small, grown if grown > TINY_BITS else 0)
 
 
 def _below(value: Fraction) -> int:
     """How many bits ``value``, which is not 0, lies below 1; 0 where it is larger."""
     return max(0, value.denominator.bit_length() - abs(value.numerator).bit_length() + 1)
-
-
-def _from_nothing(problem: Scaled) -> list[Fraction]:
-    """The largest of the first Taylor coefficients of each component of Ω and γ that is 0 at the start and then not."""
-    series, born = [problem.state], dict.fromkeys((k for k in range(6) if not problem.state[k]), Fraction(0))
-    while len(series) <= _FIRST_ORDERS and any(value < _SMALL for value in born.values()):
-        rates = series_rates(problem.system, problem.coefficients, series)
-        series.append(tuple(rate / len(series) for rate in rates))
-        born = {k: max(value, abs(series[-1][k])) for k, value in born.items()}
-    return [value for value in born.values() if value]
 
 
 class Fixed(ResumableRun):

@@ -424,7 +424,7 @@ class DigitRows(Rows):
         digits: list[Any] = [None] * count
         for k, word in enumerate(words):
             rest = _times(code, word, _raised(grid))
-            for j in range(self._first_digit(k), count):
+            for j in range(max(0, (_HEAD + grid.bits * k + BITS - 2) // BITS - 1), count):
                 exact = self._place(j) <= -grid.bits * (k + 1) and k + 1 < grid.words
                 piece = rest if exact else rounded(code, rest, self._place(j) + _raised(grid))
                 digits[j] = piece if digits[j] is None else digits[j] + piece
@@ -442,10 +442,6 @@ class DigitRows(Rows):
     def _place(self, j: int) -> int:
         """log2 u_j."""
         return _HEAD - BITS * (j + 1)
-
-    def _first_digit(self, k: int) -> int:
-        """Where the digits of word k begin."""
-        return max(0, (_HEAD + self.grid.bits * k + BITS - 2) // BITS - 1)
 
     def _words(self, sums: list[Operand]) -> list[Operand]:
         """Σ_l of sums of level l − 1, whole multiples of its unit, as words."""

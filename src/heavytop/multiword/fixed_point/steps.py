@@ -291,11 +291,6 @@ def sample_row(grid: Grid, vectors: int) -> int:
     return 8 * (grid.words * vectors + 1)
 
 
-def samples_at_once(grid: Grid) -> int:
-    """Samples that are taken side by side: of few words the operations of one wait for each other."""
-    return max(1, _WORDS_AT_ONCE // grid.words)
-
-
 def write_samples(module: ir.Module, grid: Grid, vectors: int) -> ir.Function:
     """Write ``samples(rows, order, at, first, last, result)``: from the first sample to before the last.
 
@@ -304,7 +299,8 @@ def write_samples(module: ir.Module, grid: Grid, vectors: int) -> ir.Function:
     """
     made, code = function(module, "samples", ir.VoidType(), [POINTER, INT, POINTER, INT, INT, POINTER])
     coefficients, order, at, first, last, result = code.arguments
-    words, count, null = grid.words, samples_at_once(grid), code.null
+    words, null = grid.words, code.null
+    count = max(1, _WORDS_AT_ONCE // words)  # of few words the operations of one sample wait for each other
     kept = rows_of(grid)(code, grid, vectors, most_orders(grid) + 2, coefficients, null, null, null, [])
     width = words * vectors + 1
 
