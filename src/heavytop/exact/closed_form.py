@@ -82,7 +82,7 @@ def once(make: Callable[[Any], Made]) -> Callable[[Any], Made]:
 def taylor(
     field: Callable[[Parameters, Any], tuple[Any, ...]], parameters: Parameters, start: Sequence[Fraction], length: int
 ) -> list[list[Fraction]]:
-    """The exact derivatives (not divided by factorials) of each component at the start, from the field itself."""
+    """The exact Taylor coefficients of each component at the start, from the field itself."""
     exact = parameters.mapped(rational)
     rows = [[rational(value)] for value in start]
     with series_length(length):
@@ -90,10 +90,10 @@ def taylor(
             y = [fmpq_series(row, prec=length) for row in rows]
             for row, slope in zip(rows, field(exact, y), strict=True):
                 row.append(coefficient(fmpq_series(slope), order - 1) / order)
-    return [[Fraction(int(c.p), int(c.q)) * factorial(n) for n, c in enumerate(row)] for row in rows]
+    return [[Fraction(int(c.p), int(c.q)) for c in row] for row in rows]
 
 
-def without_turning(real: Sequence[Fraction], imaginary: Sequence[Fraction], winding: Winding) -> list[Pair]:
+def unwound(real: Sequence[Fraction], imaginary: Sequence[Fraction], winding: Winding) -> list[Pair]:
     """Taylor coefficients of e^(−iκt) (u + i √square v), κ = rate √square, as pairs (real, imaginary/√square).
 
     real, imaginary: the coefficients of u and v.
@@ -108,12 +108,6 @@ def without_turning(real: Sequence[Fraction], imaginary: Sequence[Fraction], win
             a, b = (a + weight * u, b + weight * v) if n % 2 == 0 else (a - weight * winding.square * v, b + weight * u)
         factors.append((a, b))
     return factors
-
-
-def turned(real: Sequence[Fraction], imaginary: Sequence[Fraction], winding: Winding) -> list[Pair]:
-    """:func:`without_turning` in derivatives at 0, not divided by factorials: of u and v, and of the product."""
-    u, v = ([value / factorial(n) for n, value in enumerate(part)] for part in (real, imaginary))
-    return [(factorial(n) * a, factorial(n) * b) for n, (a, b) in enumerate(without_turning(u, v, winding))]
 
 
 def initial_xi(gamma: Vector) -> list[arb]:
@@ -218,8 +212,8 @@ def across(gamma: Vector) -> Vector:
     return candidates[0] if any(candidates[0]) else candidates[1]
 
 
-def derivatives_of_fixed(parameters: Parameters, start: State, vector: Sequence[Fraction]) -> list[list[Fraction]]:
-    """The first four derivatives at t = 0, exact, of the components of a vector fixed in space, in a heavy top."""
+def taylor_of_fixed(parameters: Parameters, start: State, vector: Sequence[Fraction]) -> list[list[Fraction]]:
+    """The first four Taylor coefficients, exact, of the body components of a vector fixed in space, of a heavy top."""
 
     def field(p: Parameters, y: Any) -> tuple[Any, ...]:
         return (*heavy_top(p, y[:6]), *HEAVY_TOP.attitude(p, y[:6], y[6:]))

@@ -69,11 +69,6 @@ def positive(values: Sequence[Fraction]) -> bool:
     return min(values) > 0
 
 
-def differ(values: Sequence[Fraction]) -> bool:
-    """Whether no value is 0."""
-    return all(values)
-
-
 @dataclass(frozen=True, slots=True)
 class ExactRelation:
     """A relation between exact data of a top and a start.
@@ -166,7 +161,7 @@ NO_TORQUE = ExactRelation("P r = 0", "P r", lambda top, _: top.moment)
 ON_AXIS_1 = ExactRelation("P b = P c = 0", "P b, P c", lambda top, _: top.moment[1:]), TORQUE
 IN_PLANE_13 = ExactRelation("P b = 0", "P b", lambda top, _: top.moment[1:2])
 MOMENTS_1_3 = ExactRelation("I1 != I3", "I1 - I3", lambda top, _: (_differ(top, 0, 2),), any)
-OFF_AXES_13 = ExactRelation("P a != 0, P c != 0", "P a, P c", lambda top, _: (top.moment[0], top.moment[2]), differ)
+OFF_AXES_13 = ExactRelation("P a != 0, P c != 0", "P a, P c", lambda top, _: (top.moment[0], top.moment[2]), all)
 SPIN_UPWARDS = ExactRelation("Omega3 > 0", "Omega3", lambda _, start: start.omega[2:], positive)
 HESS = ExactRelation("I1 (I2 - I3) a^2 = I3 (I1 - I2) c^2", "P^2 times the difference", _hess)
 HESS_TOP = IN_PLANE_13, TORQUE, HESS

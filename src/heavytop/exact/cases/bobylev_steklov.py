@@ -28,11 +28,11 @@ from heavytop.exact.closed_form import (
     balls,
     cached_per_precision,
     carried_xi,
-    derivatives_of_fixed,
     instant,
     rotate,
     sign,
-    turned,
+    taylor_of_fixed,
+    unwound,
 )
 from heavytop.exact.elliptic.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.elliptic.quartic import Companions, PreparedMotion, QuarticMotion
@@ -197,6 +197,6 @@ def _axis(case: BobylevSteklov) -> tuple[PreparedMotion, Companions]:
     top, start = case.top, case.start
     winding, vector, parameters = axis_winding(top, start), across(start.gamma), HEAVY_TOP.parameters(top, start)
     normal = tuple(c / winding.square for c in cross(start.gamma, vector))
-    first, second = (derivatives_of_fixed(parameters, start, fixed)[2] for fixed in (vector, normal))
+    first, second = (taylor_of_fixed(parameters, start, fixed)[2] for fixed in (vector, normal))
     motion = quartic_motion(top, start).prepared()
-    return motion, motion.companions(winding, turned(first, second, winding))
+    return motion, motion.companions(winding, unwound(first, second, winding))

@@ -27,7 +27,7 @@ from typing import Any
 
 from flint import arb
 
-from heavytop.exact.closed_form import ClosedForm, balls, cached_per_precision, initial_xi, rotate, taylor, turned
+from heavytop.exact.closed_form import ClosedForm, balls, cached_per_precision, initial_xi, rotate, taylor, unwound
 from heavytop.exact.elliptic.quartic import Companions, PreparedMotion, QuarticMotion
 from heavytop.exact.elliptic.weierstrass import Point, Winding, imag, real
 from heavytop.exact.flint.balls import BallLike, Balls, ball, current_length
@@ -191,6 +191,6 @@ def _fixed(motion: Gyrostat, prepared: PreparedMotion, vector: Vector) -> _Fixed
             taylor(gyrostat, motion.parameters, (*motion.start.omega, *fixed), 4)[3:]
             for fixed in (cross(m, across), across)
         ]
-        both = (turned(products[0][axis], [-c for c in products[1][axis]], winding) for axis in (0, 2))
+        both = (unwound(products[0][axis], [-c for c in products[1][axis]], winding) for axis in (0, 2))
         waves = prepared.companions(winding, *both)
     return _Fixed(ball(share), waves, -1 / ball(square).sqrt(), ball(-1 / square))

@@ -42,14 +42,14 @@ from heavytop.exact.closed_form import (
     balls,
     cached_per_precision,
     carried_xi,
-    derivatives_of_fixed,
     in_units,
     initial_xi,
     instant,
     once,
     rotate,
     taylor,
-    turned,
+    taylor_of_fixed,
+    unwound,
 )
 from heavytop.exact.elliptic.quartic import Companions, PreparedMotion, QuarticMotion
 from heavytop.exact.elliptic.weierstrass import Winding, imag, real
@@ -218,7 +218,7 @@ def _prepared(motion: Lagrange) -> _Prepared:
     rows = taylor(heavy_top, motion.parameters, motion.start.flat, 4)
     beside = cross(axis, across)
     both = (
-        turned(_along(across, rows[k : k + 3]), [y / winding.square for y in _along(beside, rows[k : k + 3])], winding)
+        unwound(_along(across, rows[k : k + 3]), [y / winding.square for y in _along(beside, rows[k : k + 3])], winding)
         for k in (3, 0)
     )
     width, size, length = ball(dot(across, across)), ball(winding.square).sqrt(), ball(winding.square)
@@ -234,7 +234,7 @@ def _prepared(motion: Lagrange) -> _Prepared:
 
 
 def _along(direction: Vector, rows: Sequence[Sequence[Fraction]]) -> list[Fraction]:
-    """The derivatives of a vector's product with a fixed one, from those of its components."""
+    """The Taylor coefficients of a vector's product with a fixed one, from those of its components."""
     return [dot(direction, values) for values in zip(*rows, strict=True)]
 
 
@@ -246,10 +246,9 @@ def _axis(motion: Lagrange) -> Companions:
     # s Z = s ξ + i γ × ξ, so Z = ξ + i s (γ × ξ/s²)
     normal = tuple(c / square for c in cross(motion.start.gamma, vector))
     first, second = (
-        _along(motion.frame[1], derivatives_of_fixed(motion.parameters, motion.start, fixed))
-        for fixed in (vector, normal)
+        _along(motion.frame[1], taylor_of_fixed(motion.parameters, motion.start, fixed)) for fixed in (vector, normal)
     )
-    return _prepared(motion).motion.companions(winding, turned(first, second, winding))
+    return _prepared(motion).motion.companions(winding, unwound(first, second, winding))
 
 
 # The spherical top, I1 = I2 = I3 with its centre of mass anywhere: Lagrange's top about r.

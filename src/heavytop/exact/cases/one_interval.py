@@ -42,7 +42,7 @@ from heavytop.exact.flint.balls import (
 )
 from heavytop.exact.separable.abel import decide, ordered, phase_at
 from heavytop.exact.separable.oscillation import MOST_TERMS, Azimuth, Bearing, Gap, Roots, WithBearing
-from heavytop.exact.solution import GAMMA, ON_AXIS_1, ExactRelation, differ
+from heavytop.exact.solution import GAMMA, ON_AXIS_1, ExactRelation
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -309,7 +309,7 @@ class Steklov(WithBearing, ClosedForm):
 
     method = "closed form: Steklov, inversion of an elliptic integral"
     source = "V. A. Steklov (1899); formulas derived in the program"
-    body = *ON_AXIS_1, ExactRelation("I1, I2, I3 different, I1 != 2 I2, 2 I3", "the differences", _moments, differ)
+    body = *ON_AXIS_1, ExactRelation("I1, I2, I3 different, I1 != 2 I2, 2 I3", "the differences", _moments, all)
     starts = (
         GAMMA,
         ExactRelation("Omega3^2 = c0 + c2 Omega1^2", "the difference", lambda top, start: (_height(top, start)[1],)),

@@ -43,7 +43,7 @@ from heavytop.exact.closed_form import (
     once,
     rotate,
     taylor,
-    without_turning,
+    unwound,
 )
 from heavytop.exact.elliptic.quartic import QuarticMotion, lift
 from heavytop.exact.elliptic.weierstrass import (
@@ -233,7 +233,7 @@ def _momentum_series(case: ZhukovskyVolterra) -> list[list[Fraction]]:
     rows = taylor(HEAVY_GYROSTAT.field, _parameters(case), case.start.flat, _POLE + _LAST + 1)
     columns = []
     for moment, own, row in zip(case.top.inertia, case._rotor, rows[:3], strict=True):
-        series = [moment * c / factorial(n) for n, c in enumerate(row)]
+        series = [moment * c for c in row]
         columns.append([series[0] + own, *series[1:]])
     return columns
 
@@ -360,7 +360,7 @@ def _fixed(case: ZhukovskyVolterra, vector: Vector) -> _Fixed:
     for real_part, imaginary in zip(_body_series(case, across), _body_series(case, beside), strict=True):
         rows = [_times_taylor(exact.series, part) for part in (real_part, imaginary)]
         # Φ^(k) begins with (−1)^k k!/t^(k + 1)
-        parts = enumerate(reversed(without_turning(rows[0], rows[1], winding)[:_POLE]))
+        parts = enumerate(reversed(unwound(rows[0], rows[1], winding)[:_POLE]))
         scaled = [(a * (-1) ** k / factorial(k), b * (-1) ** k / factorial(k)) for k, (a, b) in parts]
         factors.append([*(ball(a) for a, _ in scaled[:order]), *(ball(-b) * root for _, b in scaled[:order])])
     return _Fixed(ball(share), second_kind(_lattice(case), winding), arb_mat(factors), invariant, order)
@@ -368,5 +368,4 @@ def _fixed(case: ZhukovskyVolterra, vector: Vector) -> _Fixed:
 
 def _body_series(case: ZhukovskyVolterra, fixed: Vector) -> list[list[Fraction]]:
     """The Taylor coefficients of a vector fixed in space in body axes, up to t^4."""
-    rows = taylor(HEAVY_GYROSTAT.field, _parameters(case), (*case.start.omega, *fixed), _POLE)[3:]
-    return [[c / factorial(n) for n, c in enumerate(row)] for row in rows]
+    return taylor(HEAVY_GYROSTAT.field, _parameters(case), (*case.start.omega, *fixed), _POLE)[3:]

@@ -144,12 +144,16 @@ class PreparedMotion:
         return self.numerator(point) * inverse + self.start
 
     def companions(self, winding: Winding, *taylors: Sequence[Pair]) -> Companions:
-        """Several F of the second theorem with the same winding; taylors: f0..f3, each as (real, imaginary/√square)."""
+        """Several F of the second theorem with the same winding.
+
+        taylors: f0, f1, f2/2 and f3/6, each as (real, imaginary/√square).
+        """
         wave = second_kind(self.lattice, winding)
         still = not any(part for taylor in taylors for pair in taylor for part in pair)
         return Companions(wave, tuple(self._factors(winding, taylor) for taylor in taylors), still)
 
-    def _factors(self, winding: Winding, taylor: Sequence[Pair]) -> Factors:
+    def _factors(self, winding: Winding, coefficients: Sequence[Pair]) -> Factors:
+        taylor = [(n * a, n * b) for n, (a, b) in zip((1, 1, 2, 6), coefficients, strict=True)]
         if isinstance(self.lattice, DegenerateLattice):
             return self._elementary(self.lattice, winding, taylor)
         root = ball(winding.square).sqrt()
