@@ -372,23 +372,11 @@ class SolutionError(StatisticsOfStates):
         """Take in the states that wait."""
         summarise([self])
 
-    def known(self, time: Fraction) -> Sequence[arb] | None:
-        """The true state; None where absent."""
-        return self.truth.state(time, self.bits) if self.truth.covers(time) else None
-
     def values(self, y: Sequence[arb], truth: Sequence[arb]) -> list[arb]:
         """The errors of a state of six balls by :data:`COMPONENTS`, and relative, at the working precision."""
         delta = [value - true for value, true in zip(y, truth, strict=True)]
         flow = self.problem.system.field(self.parameters, truth)
         return [largest(delta[:3]), largest(delta[3:]), *split(delta, flow), relative_error(delta, truth)]
-
-    def left(self, omega: arb) -> bool:
-        """Whether an error of Ω is beyond the threshold."""
-        return self.threshold is not None and bool(omega > rational(self.threshold))
-
-    def counts(self, time: Fraction) -> bool:
-        """Whether the errors at that time count."""
-        return math.isinf(self.until) or abs(float(time)) <= self.until
 
     def last(self, rate: Fraction) -> float:
         """The error of the last state that was taken in, at most: of Ω over ``rate``, or of γ, the larger."""
@@ -603,11 +591,11 @@ class _Samples:
 
     def __init__(self, error: SolutionError) -> None:
         waiting, error._waiting = error._waiting, []
-        known = [(*sample, truth) for sample in waiting if (truth := error.known(sample[0])) is not None]
-        self.error, self.states, self.truths = error, [state for _, state, _ in known], [truth for *_, truth in known]
-        self.times = [time for time, *_ in known]
-        self.kept = error._kept(self.times)
-        self.counted = [i for i, time in enumerate(self.times) if error.counts(time)]
+        known = [sample for sample in waiting if error.truth.covers(sample[0])]
+        self.error, self.times, self.states = error, [time for time, _ in known], [state for _, state in known]
+        self.truths = [error.truth.state(time, error.bits) for time in self.times]
+        self.kept, until = error._kept(self.times), error.until
+        self.counted = [i for i, time in enumerate(self.times) if math.isinf(until) or abs(float(time)) <= until]
 
     def deltas(self) -> list[list[arb]]:
         """The differences from the truth."""
@@ -632,7 +620,8 @@ class _Samples:
             below = numpy.zeros(len(self.times), bool)
             if squares is not None:
                 below = squares[0].value + squares[0].error < float(error.threshold) ** 2 / _ROOM
-            return results, next((i for i in numpy.flatnonzero(~below).tolist() if error.left(values(i)[0])), None)
+            escaped = (i for i in numpy.flatnonzero(~below).tolist() if values(i)[0] > rational(error.threshold))
+            return results, next(escaped, None)
 
 
 def summarise(errors: Iterable[SolutionError]) -> None:
