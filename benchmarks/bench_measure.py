@@ -1,4 +1,4 @@
-"""What does it cost to measure one state: drift of the integrals, and distance from an exact motion?
+"""What does it cost to measure 256 states: drift of the integrals, and distance from an exact motion?
 
 Run: python -m pytest benchmarks/bench_measure.py --benchmark-enable
 """
@@ -19,25 +19,30 @@ from heavytop.records import Against
 from heavytop.top.equations import holding
 
 FORMATS = [DOUBLE, EXTENDED, QUAD, real(237)]
+TIMES = [Fraction(i, 64) for i in range(1, 257)]
+
+
+def measure_all(measure, run) -> None:
+    for time, state in zip(run.times, run.states, strict=True):
+        measure(time, state)
+    measure.settle()
 
 
 @pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
-def test_drift_of_one_state(benchmark, precision) -> None:
+def test_drift_of_many_states(benchmark, precision) -> None:
     case = CASES["kovalevskaya"]
     drift = Drift(Problem.of(case.top, case.start, precision), holding(case.top, case.start))
-    state = propagate(case.top, case.start, [5], precision).states[0]
-    benchmark(drift, Fraction(5), state)
+    benchmark(measure_all, drift, propagate(case.top, case.start, TIMES, precision))
     benchmark.extra_info["drift_of_the_energy"] = drift.metrics()["drift_energy_final"].value
 
 
 @pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
-def test_solution_error_of_one_state(benchmark, precision) -> None:
+def test_solution_error_of_many_states(benchmark, precision) -> None:
     known = DeloneHomoclinic(Fraction(5, 4), Fraction(3))
     error = SolutionError(
         Problem.of(known.top, known.start, precision), Truth(Against("proven", known.method), known.state)
     )
-    state = propagate(known.top, known.start, [3], precision).states[0]
-    benchmark(error, Fraction(3), state)
+    benchmark(measure_all, error, propagate(known.top, known.start, TIMES, precision))
     benchmark.extra_info["error_of_omega"] = error.metrics()["solution_error_omega_final"].value
 
 
