@@ -77,7 +77,7 @@ def exponent(value: Fraction) -> int:
 # thread that waits for the lock.
 #
 # Ctrl-C comes after a call at the earliest.  From Python 3.14 on ``with _lock`` calls, and Ctrl-C between the lock and
-# its block would leave it held for ever.  So the lock is taken within a ``try``, and released by the first call of its
+# its block would leave it held.  So the lock is taken within a ``try``, and released by the first call of its
 # ``finally``; where Ctrl-C came before it was taken, that raises RuntimeError.
 
 
