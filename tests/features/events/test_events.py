@@ -11,13 +11,15 @@ from threading import Thread
 import mpmath
 import numpy as np
 import pytest
+from flint import fmpq
 
 import heavytop as ht
 from heavytop.errors import InputError, OutOfReach
-from heavytop.features.events.functions import Wanted, event_function
+from heavytop.features.events.functions import Wanted, event_function, rate_along, start_series
 from heavytop.features.events.located import locate
 from heavytop.integrate.dense import Dense, Piece
 from heavytop.integrate.trajectory import Problem
+from heavytop.top.equations import HEAVY_TOP
 
 TOP = ht.HeavyTop(inertia=(3, 2, 1), weight=1, centre=("1/2", "1/3", "1/5"))
 START = ht.State(omega=("1/10", "2/5", "9/10"), gamma=("3/5", 0, "4/5"))
@@ -227,6 +229,19 @@ def test_a_function_that_is_zero_along_the_motion_is_refused(digits) -> None:
             ht.events(PENDULUM, start, 10, function, digits=digits)
     with pytest.raises(InputError, match="is zero at every sample"):
         ht.events(PENDULUM, start, 10, lambda omega, gamma: abs(omega[1]))
+
+
+def test_a_function_has_the_taylor_coefficients_of_its_derivatives_along_the_motion() -> None:
+    """f^(n)(0)/n!, by differentiating the polynomial along the field, exactly."""
+    top = ht.HeavyTop((3, 2, 1), 2, ("1/2", "1/3", "-1/5"))
+    start = ht.State(("1/10", "-2/5", "9/10"), ("3/5", 0, "4/5"))
+    parameters = HEAVY_TOP.parameters(top, start)
+    rate = event_function("omega1**2*gamma3 - omega2*gamma1 + 3*omega3").numerator
+    (series,) = start_series([rate], HEAVY_TOP, parameters, start.flat)
+    for n in range(6):
+        value = rate(*(fmpq(v.numerator, v.denominator) for v in start.flat))
+        assert series[n] == Fraction(int(value.p), int(value.q)) / math.factorial(n)
+        rate = rate_along(rate, HEAVY_TOP, parameters)
 
 
 @pytest.mark.slow

@@ -8,7 +8,6 @@ A callable that needs numbers (``math.sin``, comparisons, ``abs``) has no such f
 from __future__ import annotations
 
 import ast
-import math
 from collections import Counter
 from collections.abc import Callable, Sequence, Sized
 from dataclasses import dataclass, field
@@ -348,9 +347,8 @@ def start_series(
     from heavytop.exact.flint.balls import coefficient, series_length
 
     rows = taylor(system.field, parameters, start, _DERIVATIVES)
-    y = [[rational(v) / math.factorial(n) for n, v in enumerate(row)] for row in rows]
     with series_length(_DERIVATIVES):
-        series = [fmpq_series(row, prec=_DERIVATIVES) for row in y]
+        series = [fmpq_series([rational(v) for v in row], prec=_DERIVATIVES) for row in rows]
         zero = fmpq_series([0], prec=_DERIVATIVES)
         along_motion = [composed(terms_of(polynomial), series, zero) for polynomial in polynomials]
         coefficients = [[coefficient(series, n) for n in range(_DERIVATIVES)] for series in along_motion]
