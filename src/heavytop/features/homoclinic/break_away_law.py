@@ -1,4 +1,4 @@
-"""The law drawn from the escape times of a run: how they grow with the bits of the format."""
+"""The growth of escape times with the bits of the format, fitted and compared with the law of the saddle."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _LARGEST = 150.0
 
 
 def break_away_law(rows: Sequence[Row]) -> list[Row]:
-    """For each homoclinic case with two formats or more: how the escape time grows with the bits.
+    """Rows with the growth of the escape time with the bits, for each homoclinic case in two formats or more.
 
     Least squares over the formats; expected slope ln 2/rate, for the errors of p-bit arithmetic leave the saddle
     like 2^-p e^(rate t).
@@ -72,7 +72,7 @@ def break_away_law(rows: Sequence[Row]) -> list[Row]:
 
 
 def _law_row(members: Sequence[Row], slope: Fraction, expected: Fraction, noise: float) -> Row:
-    """noise: by how much rounding noise moves the slope, through the escape times."""
+    """The row of a fit; noise: the change of the slope by rounding noise of the escape times."""
     off_by = abs(slope / expected - 1)
     first, horizon = members[0], max((row.horizon for row in members), key=lambda t: abs(Fraction(t)))
     formats = ",".join(row.precision for row in members)
@@ -100,22 +100,22 @@ def _with_band(metric: Metric, relative: float) -> Metric:
     return replace(metric, band=round(math.log10(1 + abs(relative)), 4))
 
 
-_Place = tuple[str, Direction, str]
+_Run = tuple[str, Direction, str]
 """Case, direction, source."""
 
 
 def escape_times(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     """Escape time against the bits of the format, with the law of the saddle."""
-    escapes: dict[_Place, dict[int, Fraction]] = {}
-    slopes: dict[_Place, tuple[str, str]] = {}
+    escapes: dict[_Run, dict[int, Fraction]] = {}
+    slopes: dict[_Run, tuple[str, str]] = {}
     for source, report in sources:
         for row in report.rows:
-            motion = _case(row), row.key.direction, source
+            run = _case(row), row.key.direction, source
             if row.outcome == "success" and (metric := row.metrics.get(ESCAPE.text)):
                 if metric.log10 is not None and metric.log10 < _LARGEST:
-                    escapes.setdefault(motion, {})[row.bits] = exact(metric.number)
+                    escapes.setdefault(run, {})[row.bits] = exact(metric.number)
             elif row.key.kind == NAME and row.metrics:
-                slopes[motion] = row.metrics[SLOPE.text].value, row.metrics[EXPECTED.text].value
+                slopes[run] = row.metrics[SLOPE.text].value, row.metrics[EXPECTED.text].value
     if not escapes:
         return None
     section = Section(
@@ -133,17 +133,17 @@ def escape_times(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     axes = new_axes("format (bits)", "escape |t| (time units of the data)", 3.0)
     merged = _both_directions(escapes)
     left_out(section, len(merged) - len(COLOURS) * max(1, len(sources)), "case")
-    alternative, bases = [], list(dict.fromkeys(name for name, _, _ in merged))[: len(COLOURS)]
-    for name, motion, source in merged:
+    alternative, bases = [], list(dict.fromkeys(name for name, _ in merged))[: len(COLOURS)]
+    for name, run in merged:
         if name not in bases:
             continue
+        source = run[2]
         old, number = source == "baseline", bases.index(name)
         label = f"{clip(name, 40)}, {source}" if source else clip(name, 40)
         key = section.key(Key(label, number, MARKERS[number], "", old, False))
-        pairs = sorted(escapes[motion].items())
-        bits, times = [float(b) for b, _ in pairs], [float(t) for _, t in pairs]
+        bits, times = zip(*((float(b), float(t)) for b, t in sorted(escapes[run].items())), strict=True)
         draw(axes, key, bits, times, 5.5)
-        measured, expected = slopes.get(motion, ("", ""))
+        measured, expected = slopes.get(run, ("", ""))
         if logarithm(expected) is not None and not old:
             slope, middle = float(exact(expected)), (sum(bits) / len(bits), sum(times) / len(times))
             line = [middle[1] + slope * (b - middle[0]) for b in bits]
@@ -162,18 +162,16 @@ def _case(row: Row) -> str:
     return row.key.case if row.key.subject.name == HEYOKA else f"{row.key.case} ({row.key.subject.name})"
 
 
-def _both_directions(escapes: dict[_Place, dict[int, Fraction]]) -> list[tuple[str, _Place, str]]:
-    """(name, place, source): a case that escapes at the same times forward and backward is named once."""
-    result: list[tuple[str, _Place, str]] = []
+def _both_directions(escapes: dict[_Run, dict[int, Fraction]]) -> list[tuple[str, _Run]]:
+    """(name, run): a case that escapes at the same times forward and backward is named once."""
+    runs = []
     for (case, direction, source), times in escapes.items():
-        other = escapes.get((case, "backward" if direction == "forward" else "forward", source))
-        if direction and other == times:
-            if direction == "forward":
-                result.append((case, (case, direction, source), source))
-        else:
-            name = f"{case}/{direction}" if direction else case
-            result.append((name, (case, direction, source), source))
-    return result
+        reverse = escapes.get((case, "backward" if direction == "forward" else "forward", source))
+        if not direction or reverse != times:
+            runs.append((f"{case}/{direction}" if direction else case, (case, direction, source)))
+        elif direction == "forward":
+            runs.append((case, (case, direction, source)))
+    return runs
 
 
 class BreakAwayLaw(Kind):
@@ -185,15 +183,15 @@ class BreakAwayLaw(Kind):
     place = 70
 
     def carries_band(self, metric: Metric) -> bool:
-        """The slope, and how far it is off."""
+        """True for errors, and for the slope."""
         return super().carries_band(metric) or metric.quantity == SLOPE
 
     def noise_is_added(self, metric: Metric) -> bool:
-        """To slopes."""
+        """True: the noise of slopes adds up."""
         return True
 
     def contradictions(self, row: Row) -> Iterator[str]:
-        """The three numbers say the same."""
+        """A deviation that is not that of the slope from the expected one."""
         values = [metric.value for metric in _numbers(row)]
         if len(values) < 3:
             return
@@ -205,7 +203,7 @@ class BreakAwayLaw(Kind):
             yield f"{OFF_BY.text}: {values[2]}, where the slope is {values[0]} and {values[1]} is expected"
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
-        """The time that a bit of the format buys, and how far that is from the law; a line a case."""
+        """The delay of the escape per bit of the format, its deviation from the law, and a line for each case."""
         slopes, off = ([float(row.metrics[metric.text]) for row in rows if row.metrics] for metric in (SLOPE, OFF_BY))
         if slopes:
             low, high = f"{min(slopes):.2g}", f"{max(slopes):.2g}"
@@ -223,5 +221,5 @@ class BreakAwayLaw(Kind):
 
 
 def _numbers(row: Row) -> list[Metric]:
-    """The slope, the expected one and by how much it is off."""
+    """The slope, the expected slope and the relative deviation."""
     return [row.metrics[metric.text] for metric in (SLOPE, EXPECTED, OFF_BY) if metric.text in row.metrics]

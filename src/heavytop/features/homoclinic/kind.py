@@ -1,4 +1,4 @@
-"""Integrators on a homoclinic motion, against its closed form, until they escape from it."""
+"""Errors of integrators on a homoclinic motion, against its closed form, and the times of their escape."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ from heavytop.report.render.text import NOISE_BAND, both, drifts
 
 NAME = "homoclinic"
 ESCAPED = Fraction(1, 1000)
-"""A computed homoclinic motion has escaped when Ω is wrong by this, in units of α."""
+"""A computed homoclinic motion has escaped when the error of Ω reaches this, in units of α."""
 WINDOW = 10
-"""The error of a homoclinic run is a number only while rate·|t| is below this; later the saddle amplifies rounding."""
-_AS_LONG, _WORSE = 0.05, 2.0
-"""Decades of the escape time, and of an error."""
+"""Errors are measured while rate·|t| is below this; later the saddle amplifies rounding."""
+_EARLIER, _WORSE = 0.05, 2.0
+"""Decades by which an escape is earlier, and an error worse."""
 _CERTIFIED_AT = 4
 """The closed form of a homoclinic case is certified at this |t|."""
 
 
 class HomoclinicTable(PlanTable, tag=NAME):
-    """samples: samples in one unit of 1/rate.  integrator: any that `heavytop list` shows."""
+    """samples: number of samples per unit of 1/rate.  integrator: any that `heavytop list` shows."""
 
     cases: list[str]
     precisions: list[str]
@@ -69,7 +69,7 @@ class HomoclinicTable(PlanTable, tag=NAME):
 
 
 class Homoclinic(Kind):
-    """When a run leaves a homoclinic motion, and its error and drift before.
+    """The escape time of a run from a homoclinic motion, and its error and drift before.
 
     Errors of Ω in 1/time unit, of γ none.
     """
@@ -83,23 +83,23 @@ class Homoclinic(Kind):
     place = 60
 
     def carries_band(self, metric: Metric) -> bool:
-        """Every error, and the time."""
+        """True for every error, and for the escape time."""
         return super().carries_band(metric) or metric.quantity == ESCAPE
 
     def noise_is_reruns(self, metric: Metric) -> bool:
-        """All bands."""
+        """True: every band is that of reruns."""
         return True
 
     def series_has_more(self, quantity: Quantity | None) -> bool:
-        """Near a saddle, errors are taken early, and the series goes on."""
+        """True for errors: near a saddle they are measured early, and the series continues."""
         return quantity is None or quantity.name != DRIFT
 
     def conclude(self, rows: Sequence[Row]) -> list[Row]:
-        """How the escape time grows with the bits."""
+        """The growth of the escape time with the bits."""
         return break_away_law(rows)
 
     def measure(self, task: Task, saved: Saved) -> Row:
-        """The case has a homoclinic closed form, and the format takes its data exactly; the times are uniform.
+        """The row of a case whose data are exact in the format; the times are uniform.
 
         Raises OutOfReach where the closed form is not certified for the format.
         """
@@ -120,32 +120,32 @@ class Homoclinic(Kind):
         run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer)
         error = scorer.error
         assert error is not None
-        own = by_name({ESCAPE: time_metric(error.escape, "duration")}) | error.metrics() | scorer.drift.metrics()
-        metrics = _with_bands(task, run, own)
+        metrics = by_name({ESCAPE: time_metric(error.escape, "duration")}) | error.metrics() | scorer.drift.metrics()
+        metrics = _with_bands(task, run, metrics)
         series = error.series(time_text) | scorer.drift.series(time_text)
         return computed_row(task, run, metrics, series, known.against)
 
     def contradictions(self, row: Row) -> Iterator[str]:
-        """A motion escapes before the run ends."""
-        away = row.metrics.get(ESCAPE.text)
-        if away is not None and away.log10 is not None and abs(exact(away.number)) > abs(exact(row.horizon)):
-            yield f"{ESCAPE.text}: {away.value} is beyond the horizon {row.horizon}"
+        """An escape time beyond the horizon."""
+        escape = row.metrics.get(ESCAPE.text)
+        if escape is not None and escape.log10 is not None and abs(exact(escape.number)) > abs(exact(row.horizon)):
+            yield f"{ESCAPE.text}: {escape.value} is beyond the horizon {row.horizon}"
 
     def line(self, row: Row) -> str:
-        """The error of Ω in its window, and the escape."""
-        (what, error), *_ = _errors(row).items()
+        """The error of Ω before the escape, and the escape time."""
+        (name, error), *_ = _errors(row).items()
         escape = Value(row.metrics.get(ESCAPE.text))
-        return f"{what} {cell_text(Value(error))} while rate·|t| <= {WINDOW}; escape at |t| = {cell_text(escape)}"
+        return f"{name} {cell_text(Value(error))} while rate·|t| <= {WINDOW}; escape at |t| = {cell_text(escape)}"
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
-        """Until when they stay; the earlier escape of both directions, and what it hides; a line for each case."""
+        """The range of escape times; the earlier escape of both directions; losses that it hides; a line per row."""
         known = [row for row in rows if row.outcome == Outcome.SUCCESS.value and ESCAPE.text in row.metrics]
         if known:
             yield _headline(known)
         earlier: dict[tuple[str, str, str], Row] = {}
         for row in (row for row in rows if ESCAPE.text in row.metrics):
             motion = row.key.case, row.key.subject.name, row.precision
-            earlier[motion] = min(earlier.get(motion, row), row, key=_stayed)
+            earlier[motion] = min(earlier.get(motion, row), row, key=_log_escape)
         shown = list(earlier.values())
         title = "Escape from a homoclinic motion at |t|"
         yield from in_columns(title, lambda row: short(row.metrics[ESCAPE.text].value), shown)
@@ -165,13 +165,14 @@ class Homoclinic(Kind):
 
 
 def _headline(known: Sequence[Row]) -> Headline:
-    """Until when the narrowest and the widest format stay; of third-party integrators where there are any."""
-    theirs = [row for row in known if row.key.subject.name != HEYOKA]
-    name, cases = (theirs or known)[0].key.subject.name, dict.fromkeys(row.key.case for row in theirs or known)
-    on = "a homoclinic motion" if len(cases) > 1 else clip(next(iter(cases)), 40)
-    sentence = f"{clip(name, 40)} stays on {on} up to |t| = {_stays(row for row in known if _by(row, name))}"
-    ours = [row for row in known if theirs and _by(row, HEYOKA) and row.key.case in cases]
-    return Headline(f"{sentence}{f'; {HEYOKA} to {_stays(ours)}' if ours else ''}.")
+    """The escape times of the narrowest and the widest format, of third-party integrators where there are any."""
+    third_party = [row for row in known if row.key.subject.name != HEYOKA]
+    shown = third_party or known
+    name, cases = shown[0].key.subject.name, dict.fromkeys(row.key.case for row in shown)
+    motion = "a homoclinic motion" if len(cases) > 1 else clip(next(iter(cases)), 40)
+    sentence = f"{clip(name, 40)} stays on {motion} up to |t| = {_escapes(row for row in known if _by(row, name))}"
+    ours = [row for row in known if third_party and _by(row, HEYOKA) and row.key.case in cases]
+    return Headline(f"{sentence}{f'; {HEYOKA} to {_escapes(ours)}' if ours else ''}.")
 
 
 def _cells(row: Row) -> list[Cell]:
@@ -181,7 +182,7 @@ def _cells(row: Row) -> list[Cell]:
 
 
 def _errors(row: Row) -> dict[str, Metric | None]:
-    """The errors of Ω and γ, and the largest drift of a first integral, by what is said of them."""
+    """The errors of Ω and γ and the largest drift of a first integral, by their names in sentences."""
     names = (name for name in (INTEGRATION_ERROR, SOLUTION_ERROR) if row.metric(name, "omega", "max"))
     name = next(names, SOLUTION_ERROR)
     drift = max((metric for _, metric in drifts(row)), key=size, default=None)
@@ -190,38 +191,38 @@ def _errors(row: Row) -> dict[str, Metric | None]:
 
 
 def _hidden(rows: Iterable[Row]) -> Iterator[str]:
-    """Losses that an escape time does not show: a run that stays as long as heyoka's and is worse in another way."""
+    """Losses that an escape time does not show: errors worse than heyoka's of a run that escapes as late."""
     ours = {(row.key.case, row.precision): row for row in rows if _by(row, HEYOKA)}
     for row in rows:
-        own = ours.get((row.key.case, row.precision), row)
-        if _stayed(row) < _stayed(own) - _AS_LONG:
+        reference = ours.get((row.key.case, row.precision), row)
+        if _log_escape(row) < _log_escape(reference) - _EARLIER:
             continue
-        pairs = zip(_errors(row).items(), _errors(own).values(), strict=True)
-        worse = [(size(mine) - size(known), what, mine, known) for (what, mine), known in pairs if mine and known]
-        lost, what, mine, known = max(worse, key=lambda entry: entry[0], default=(0.0, "", None, None))
+        pairs = zip(_errors(row).items(), _errors(reference).values(), strict=True)
+        worse = [(size(error) - size(known), name, error, known) for (name, error), known in pairs if error and known]
+        lost, name, error, known = max(worse, key=lambda entry: entry[0], default=(0.0, "", None, None))
         if lost > _WORSE:
-            yield f"{row.key.case}: the {what} of {row.key.subject.name} is {Value(mine)}, heyoka's {Value(known)}."
+            yield f"{row.key.case}: the {name} of {row.key.subject.name} is {Value(error)}, heyoka's {Value(known)}."
 
 
-def _stayed(row: Row) -> float:
-    """log10 of the escape time; of none that of the horizon."""
-    return math.log10(abs(exact(_until(row))))
+def _log_escape(row: Row) -> float:
+    return math.log10(_escape(row))
 
 
-def _until(row: Row) -> str:
+def _escape(row: Row) -> Fraction:
+    """|t| of the escape, or of the horizon without one."""
     time = row.metrics[ESCAPE.text]
-    return row.horizon if time.log10 is None else time.value
+    return abs(exact(row.horizon if time.log10 is None else time.value))
 
 
 def _by(row: Row, name: str) -> bool:
     return row.key.subject.name == name
 
 
-def _stays(rows: Iterable[Row]) -> str:
+def _escapes(rows: Iterable[Row]) -> str:
     """``12 to 63 in double, 62 to 321 in real:237``: escape times of the narrowest and the widest format."""
     formats: dict[tuple[int, str], list[Fraction]] = {}
     for row in rows:
-        formats.setdefault((row.bits, row.precision), []).append(abs(exact(_until(row))))
+        formats.setdefault((row.bits, row.precision), []).append(_escape(row))
     sentences = []
     for _, name in dict.fromkeys((min(formats), max(formats))):
         low, high = (f"{float(pick(formats[_, name])):.3g}" for pick in (min, max))
@@ -230,7 +231,7 @@ def _stays(rows: Iterable[Row]) -> str:
 
 
 def _end(case: Case, bits: int) -> float:
-    """|t| by which a run with so many bits has escaped."""
+    """|t| at which a run with so many bits has certainly escaped."""
     return (1.1 * bits * math.log(2) + 4) / case.rate
 
 
@@ -241,30 +242,30 @@ def _scorer(case: Case, problem: Problem, truth: Truth, keep: Sequence[Fraction]
 
 
 def _with_bands(task: Task, run: Trajectory, metrics: dict[str, Metric]) -> dict[str, Metric]:
-    """``metrics`` of a row with their bands, that of the escape time from the times of the reruns."""
+    """``metrics`` of a row with their bands; that of the escape time comes from the escapes of the reruns."""
     case = task.case
     assert case is not None
     reruns = Reruns(Problem.of(case.top, case.start, DOUBLE, case.system), task.integrator, task.seed)
     if run.outcome is not Outcome.SUCCESS or not reruns.possible:
         return metrics
     times = tuple(time for time in task.times[3::4] if float(abs(time)) <= _end(case, DOUBLE.bits))
-    # another package's integrator may not do the same again
-    again = _again if reruns.integrator.ensemble else _again.__wrapped__
-    measured, escaped = again(case, reruns, times)
+    # runs of another package's integrator may differ from call to call
+    rerun = _reruns if reruns.integrator.ensemble else _reruns.__wrapped__
+    measured, escaped = rerun(case, reruns, times)
     metrics = banded(run, metrics, measured)
-    escapes = [abs(escape) for escape in escaped if escape is not None]
-    own = metrics[ESCAPE.text]
-    if own.log10 is not None and len(escapes) == len(escaped):
-        band = escape_band(exact(own.value), escapes, case.rate, task.precision.bits)
-        metrics = metrics | {ESCAPE.text: replace(own, band=band)}
+    escapes = [abs(time) for time in escaped if time is not None]
+    escape = metrics[ESCAPE.text]
+    if escape.log10 is not None and len(escapes) == len(escaped):
+        band = escape_band(exact(escape.value), escapes, case.rate, task.precision.bits)
+        metrics = metrics | {ESCAPE.text: replace(escape, band=band)}
     return metrics
 
 
 @lru_cache(maxsize=16)
-def _again(
+def _reruns(
     case: Case, reruns: Reruns, times: tuple[Fraction, ...]
 ) -> tuple[list[dict[str, Metric]], list[Fraction | None]]:
-    """Metrics and escape times of the reruns, the same for every format that the case is measured in."""
+    """Metrics and escape times of the reruns, shared by all formats that the case is measured in."""
     assert case.homoclinic is not None
     truth = Truth(Against("proven", case.homoclinic.method), case.homoclinic.state).remembered()
     scorers = reruns.of(times, lambda problem: _scorer(case, problem, truth))

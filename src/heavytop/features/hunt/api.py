@@ -12,7 +12,7 @@ from heavytop import arguments
 from heavytop.arguments import Number
 from heavytop.errors import InputError, quoted
 from heavytop.features.hunt.measured import FAMILIES, Family
-from heavytop.features.hunt.search import Advance, Asked, Hunted, documents
+from heavytop.features.hunt.search import Advance, Hunted, HuntRequest, documents
 from heavytop.features.hunt.search import hunt as search
 from heavytop.features.hunt.text import hunt_text
 from heavytop.integrate import registry
@@ -33,7 +33,7 @@ class Hunt:
     shrinking, ``system``, ``digits_lost``, ``ratio`` to the other integrator's error (None where one was aborted),
     ``outcome``, ``class``, ``command`` that shows it again, ``toml`` ready to paste.
     motions: that were tried, shrinking left out.  seed: of the search.
-    hunted: everything that was measured; again: the command that searches so again.
+    hunted: everything that was measured; again: the command of the same search.
     """
 
     found: list[dict[str, Any]]
@@ -103,18 +103,18 @@ def hunt(
     if not 0 <= first <= 10**9:
         raise InputError(f"seed must be in range; got {quoted(first)}.", "Give a number from 0 to 1000000000.")
     pair = described(which), None if other is None else described(other)
-    asked = Asked(pair[0], form, time, family, pair[1], beyond, motions, seconds, first)
+    request = HuntRequest(pair[0], form, time, family, pair[1], beyond, motions, seconds, first)
     try:
-        hunted = search(asked, arguments.callback(advance, "advance"))
+        hunted = search(request, arguments.callback(advance, "advance"))
     finally:
         close_all()
-    name = integrator if isinstance(integrator, str) else asked.integrator.name
-    again = _again(asked, name, against, hunted.planned)
-    return Hunt(documents(hunted, name), hunted.motions, asked.seed, hunted, again)
+    name = integrator if isinstance(integrator, str) else request.integrator.name
+    again = _again(request, name, against, hunted.planned)
+    return Hunt(documents(hunted, name), hunted.motions, request.seed, hunted, again)
 
 
 def _budget(value: int | str) -> tuple[int | None, float | None]:
-    """A number of motions, or seconds."""
+    """(number of motions, None) or (None, seconds)."""
     if isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= _MOST:
         return value, None
     text = value.strip() if isinstance(value, str) else ""
@@ -125,14 +125,14 @@ def _budget(value: int | str) -> tuple[int | None, float | None]:
     raise InputError(f"budget must be a time or a number of motions; got {quoted(value)}.", _BUDGET)
 
 
-def _again(asked: Asked, name: str, against: str | Callable[..., Any] | None, planned: int) -> str:
-    """The command that searches so again, with the number of motions in the place of seconds."""
-    parts = [f"heavytop hunt --integrator {quote(name)} --precision {asked.precision.name}"]
-    parts.append(f"--horizon {time_text(asked.horizon)} --budget {planned} --seed {asked.seed}")
-    if asked.family != "any":
-        parts.append(f"--family {asked.family}")
-    if asked.against is not None:
-        parts.append(f"--against {quote(against if isinstance(against, str) else asked.against.name)}")
-    if asked.limit is not None:
-        parts.append(f"--limit {asked.limit:.17g}")
+def _again(request: HuntRequest, name: str, against: str | Callable[..., Any] | None, planned: int) -> str:
+    """The command of the same search, with the number of motions in place of seconds."""
+    parts = [f"heavytop hunt --integrator {quote(name)} --precision {request.precision.name}"]
+    parts.append(f"--horizon {time_text(request.horizon)} --budget {planned} --seed {request.seed}")
+    if request.family != "any":
+        parts.append(f"--family {request.family}")
+    if request.against is not None:
+        parts.append(f"--against {quote(against if isinstance(against, str) else request.against.name)}")
+    if request.limit is not None:
+        parts.append(f"--limit {request.limit:.17g}")
     return " ".join(parts)

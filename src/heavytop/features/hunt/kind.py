@@ -1,4 +1,4 @@
-"""The search for the motion that breaks an integrator, as part of a plan; what was found before is measured first."""
+"""The search for the motion that breaks an integrator, as part of a plan; earlier findings are measured first."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 from heavytop.errors import InputError, quoted
 from heavytop.features.hunt.measured import Family
-from heavytop.features.hunt.search import Asked, Hunted, command_of, hunt, keep, kept
+from heavytop.features.hunt.search import Hunted, HuntRequest, command_of, hunt, keep, kept
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.plan import positive
 from heavytop.harness.rows import Find, PlanTable, Task, computed, exact_row, failed
@@ -28,10 +28,9 @@ _MOST = 1_000_000
 
 
 class HuntTable(PlanTable, tag=NAME):
-    """As the options of `heavytop hunt`; budget: motions, as a plan measures the same on every machine.
+    """The options of `heavytop hunt`; budget: a number of motions, so that every machine measures the same.
 
-    found: a file of [[top]] tables, in the working directory: its motions are measured first, and what is found is
-    added to it.
+    found: a file of [[top]] tables, in the working directory: its motions are measured first, and findings are added.
     """
 
     integrator: str = HEYOKA
@@ -45,7 +44,7 @@ class HuntTable(PlanTable, tag=NAME):
     found: str = ""
 
     def tasks(self, find: Find) -> list[Task]:
-        """One."""
+        """One task."""
         (horizon,) = positive([self.horizon], "horizon")
         if not 1 <= self.budget <= _MOST:
             raise InputError(f"budget = {self.budget} is not a number of motions.", f"Give 1 to {_MOST}.")
@@ -67,44 +66,44 @@ class HuntTable(PlanTable, tag=NAME):
 
 
 class HuntKind(Kind):
-    """A row is what a search came to; one that found anything failed, and says on which motion."""
+    """One search per row; a search with a finding is a failed row that names its motion."""
 
     name = NAME
     table = HuntTable
     place = 35
 
     def cost(self, task: Task) -> float:
-        """Some 10 ms a motion."""
+        """About 10 ms per motion."""
         return 5.0 + 0.01 * float(task.options.budget)
 
     def assumed_band(self, subject: Subject) -> float:
-        """The largest of many motions is chance."""
+        """A decade: the largest error of many motions is random."""
         return 1.0
 
     def measure(self, task: Task, saved: Saved) -> Row:
         """The search.  Raises PeerFailed for an integrator that cannot be used at all."""
-        asked = _asked(task)
-        hunted = hunt(asked)
+        request = _request(task)
+        hunted = hunt(request)
         if hunted.found and task.options.found:
             keep(Path(task.options.found), [m.motion for m in hunted.found])
         if hunted.found:
-            return failed(task, _said(hunted))
+            return failed(task, _cause(hunted))
         lost = f"{hunted.lost} of which no format of its size can follow"
         measured = f"the worst of {hunted.motions} motions, {lost}"
         law = f"{hunted.law:.2g} eps times the motion's amplification times the root of its radians"
-        return exact_row(task, measured, Against("equations", law), _metrics(hunted), asked.precision.bits)
+        return exact_row(task, measured, Against("equations", law), _metrics(hunted), request.precision.bits)
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
-        """The search that came nearest to a finding; a line a row."""
+        """The search that came nearest to a finding; a line for each row."""
         if rows:
             yield Headline(f"{_line(max(rows, key=lambda row: exact(row.metrics[WORST.text].value)))}.")
         lines = [Note(_line(row)) for row in rows]
         yield Card("Searches for the motion that breaks an integrator", lines, shown=In.SHORT | In.FULL | In.PAGE)
 
 
-def _asked(task: Task) -> Asked:
+def _request(task: Task) -> HuntRequest:
     table: HuntTable = task.options
-    return Asked(
+    return HuntRequest(
         task.integrator,
         task.precision,
         physical(table.horizon, "horizon"),
@@ -117,17 +116,17 @@ def _asked(task: Task) -> Asked:
     )
 
 
-def _said(hunted: Hunted) -> str:
-    """The worst that was found, and the command that shows it."""
+def _cause(hunted: Hunted) -> str:
+    """The worst finding, and the command that shows it again."""
     m = hunted.found[0]
-    what = f"an error of {m.error:.3g}" if math.isfinite(m.error) else f"the run ends as {m.outcome}"
-    name = hunted.asked.integrator.name
-    command = command_of(hunted.asked, m.motion, name, math.isinf(m.error))
-    return f"{name}, of {hunted.motions} motions: {what}, {command};"
+    error = f"an error of {m.error:.3g}" if math.isfinite(m.error) else f"the run ends as {m.outcome}"
+    name = hunted.request.integrator.name
+    command = command_of(hunted.request, m.motion, name, math.isinf(m.error))
+    return f"{name}, of {hunted.motions} motions: {error}, {command};"
 
 
 def _metrics(hunted: Hunted) -> dict[str, Metric]:
-    eps = float(hunted.asked.precision.eps)
+    eps = float(hunted.request.precision.eps)
     worst = max((m.error / m.explained(eps) / hunted.law for m in hunted.worst), default=0.0)
     values = {WORST: worst, MEDIAN: hunted.median}
     return by_name({q: of_fraction(Fraction(v), "error") for q, v in values.items() if math.isfinite(v)})
@@ -135,5 +134,5 @@ def _metrics(hunted: Hunted) -> dict[str, Metric]:
 
 def _line(row: Row) -> str:
     worst = short(row.metrics[WORST.text].value)
-    about = f"the worst error is {worst} times what the integrator's law and the motion's amplification explain"
-    return f"{row.case} {row.integrator} {row.precision}: nothing found; {about}"
+    ratio = f"the worst error is {worst} times what the integrator's law and the motion's amplification explain"
+    return f"{row.case} {row.integrator} {row.precision}: nothing found; {ratio}"

@@ -1,9 +1,9 @@
-"""How wrong an integrator is on many motions, and how much of it the motions themselves explain.
+"""Errors of an integrator on many motions, and the part of them that the motions themselves explain.
 
-The truth is a run in about twice the digits of the format, double-double in lanes for double; a second one from a start
-moved by 2^-17 roundings tells how much the motion amplifies, for a hundredth of the cost of
-:mod:`heavytop.top.amplification`, which is asked before anything is called found.  Errors are max(|δΩ|/rate, |δγ|)
-over the samples, with the :func:`heavytop.top.amplification.rate` of the motion.
+The reference is a run in about twice the digits of the format, double-double in lanes for double.  A second run from a
+start moved by 2^-17 roundings measures the amplification of the motion, at a hundredth of the cost of
+:mod:`heavytop.top.amplification`, which every finding is checked with.  Errors are max(|δΩ|/rate, |δγ|) over the
+samples, with the :func:`heavytop.top.amplification.rate` of the motion.
 """
 
 from __future__ import annotations
@@ -34,31 +34,34 @@ from heavytop.top.amplification import amplification, digits_eaten, rate
 from heavytop.top.equations import system_of
 from heavytop.top.heavy_top import HeavyTop, State
 
-# A Python third-party integrator in a process of its own, which is ended when one motion exceeds its time limit.
+# Runs of an integrator of any kind; a Python third-party one in a process of its own.
 
 
-SECONDS = 10.0
-"""Of one motion, as of a row of a gate whose integrator keeps running out of time."""
+_SECONDS = 10.0
+"""Time limit of one motion, as of a row of a gate whose integrator keeps running out of time."""
 _BEGIN = 60.0
 
 
 class IntegratedRun(NamedTuple):
-    """How a run ended, and its states, one a time, in native numbers; said: why it was aborted."""
+    """The outcome of a run and its states, one per time, in native numbers; reason: why it was aborted."""
 
     outcome: str
     states: Sequence[Any]
-    said: str = ""
+    reason: str = ""
 
 
-def follow(
+def integrated(
     integrator: Integrator, top: HeavyTop, start: State, times: Sequence[Fraction], precision: Precision
 ) -> IntegratedRun:
-    """One motion by an integrator of any kind, contained; raises InputError for what it cannot do at all."""
+    """A run of an integrator of any kind, whose failure is an outcome.
+
+    Raises InputError for a format or system that the integrator does not support.
+    """
     try:
         if integrator.ensemble or isinstance(integrator.source, Command):
             run = integrator.propagate(top, start, times, precision, system_of(None, top), again=False)
         else:
-            run = _ready(integrator)(top, start, times, precision, system=system_of(None, top))
+            run = _loaded(integrator)(top, start, times, precision, system=system_of(None, top))
     except InputError:
         raise
     except HeavyTopError as error:
@@ -67,35 +70,30 @@ def follow(
     return IntegratedRun((Outcome.INCOMPLETE if short else run.outcome).value, run.states)
 
 
-@lru_cache(maxsize=4)
-def _ready(integrator: Integrator) -> registry.Peer:
-    """The integrator, looked up once."""
-    return registry.ready(integrator)
+_loaded = lru_cache(maxsize=4)(registry.ready)
 
 
-class Apart:
-    """A process with that integrator; a motion that it does not finish within ``seconds`` ends it, and another begins.
+class IsolatedIntegrator:
+    """An integrator in a process of its own, which is killed when one motion exceeds its time limit.
 
-    What the integrator started ends with its process.
+    The next motion starts another process.  What the integrator started ends with its process.
     """
 
-    def __init__(self, integrator: Integrator, seconds: float = SECONDS) -> None:
-        self._integrator, self._seconds = integrator, seconds
+    def __init__(self, integrator: Integrator) -> None:
+        self._integrator = integrator
         self._process: GuardedProcess | None = None
 
-    def follow(self, top: HeavyTop, start: State, times: Sequence[Fraction], precision: Precision) -> IntegratedRun:
-        """One motion; one that ends its process or takes too long is an outcome."""
+    def run(self, top: HeavyTop, start: State, times: Sequence[Fraction], precision: Precision) -> IntegratedRun:
+        """The run of one motion; the end of the process and the time limit are outcomes."""
         try:
             process = self._process or self._begin()
-            asked = process.submit(follow, self._integrator, top, start, times, precision)
-            if isinstance(
-                asked.exception(timeout=self._seconds), KeyboardInterrupt
-            ):  # of the integrator, not of a user
+            future = process.submit(integrated, self._integrator, top, start, times, precision)
+            if isinstance(future.exception(timeout=_SECONDS), KeyboardInterrupt):  # of the integrator, not of a user
                 return IntegratedRun(FAILED, (), f"{self._integrator.name} raised KeyboardInterrupt")
-            return asked.result()
+            return future.result()
         except TimeoutError:
             self.end()
-            return IntegratedRun(OUT_OF_TIME, (), f"{self._integrator.name} was stopped after {self._seconds:.3g} s")
+            return IntegratedRun(OUT_OF_TIME, (), f"{self._integrator.name} was stopped after {_SECONDS:.3g} s")
         except BrokenProcessPool:
             self.end()
             return IntegratedRun(FAILED, (), f"{self._integrator.name} ended its whole process")
@@ -103,7 +101,7 @@ class Apart:
     def _begin(self) -> GuardedProcess:
         self._process = process = GuardedProcess()
         try:
-            process.guard(process.submit(_hello, self._integrator).result(timeout=_BEGIN))
+            process.guard(process.submit(_warmed_up, self._integrator).result(timeout=_BEGIN))
         except TimeoutError:
             self.end()
             raise PeerFailed(f"{self._integrator.name} cannot be loaded within {_BEGIN:.3g} s") from None
@@ -116,36 +114,36 @@ class Apart:
             process.end()
 
 
-def _hello(integrator: Integrator) -> int:
-    """The number of the process; what the integrator imports is imported now, and not in the time of a motion."""
+def _warmed_up(integrator: Integrator) -> int:
+    """The number of this process, after a first run: imports and compilation take no time of a motion."""
     begin_row()
-    with suppress(HeavyTopError, KeyboardInterrupt):  # a motion says what it raises
-        follow(integrator, HeavyTop((3, 2, 1), 1, (0, 0, 1)), State((0, 0, 1), (0, 0, 1)), [Fraction(1)], DOUBLE)
+    with suppress(HeavyTopError, KeyboardInterrupt):  # the run of a motion reports what it raises
+        integrated(integrator, HeavyTop((3, 2, 1), 1, (0, 0, 1)), State((0, 0, 1), (0, 0, 1)), [Fraction(1)], DOUBLE)
     return os.getpid()
 
 
-# Motions that a hunt tries: drawn at random in ways that integrators find hard, and changed from the worst so far.
+# Candidate motions of a hunt: drawn at random in ways that integrators find hard, or changed from the worst so far.
 #
-# Everything is exact and depends on the seeds of :class:`Dice` alone.
+# All data are exact and depend on the seeds of :class:`Dice` alone.
 
 
 Family = Literal["any", "euler", "lagrange", "kovalevskaya", "heavy_gyrostat"]
 FAMILIES: tuple[Family, ...] = ("any", "euler", "lagrange", "kovalevskaya", "heavy_gyrostat")
 Motion = tuple[HeavyTop, State]
 MOST_TURNS = 20_000
-"""Motions of more radians, the rate times the horizon, are not tried: they cost what thousands of others do."""
+"""Motions of more radians, the rate times the horizon, are not tried: one costs as much as thousands of others."""
 _MOST_RATIO = 10**6
 _LARGEST = 10**30
 _BITS = 40
 _UNIT_BITS = 60
 _PLAIN_EVERY = 2
-"""Of the first motions every second is a plain random top: the law of the integrator is measured on them."""
+"""Every second of the first motions is a plain random top: the law of the integrator is measured on them."""
 _POLES = [tuple(Fraction(sign * (i == j)) for j in range(3)) for i in range(3) for sign in (1, -1)]
 _T = TypeVar("_T")
 
 
 class Dice:
-    """Draws of one seed; the same on every machine, as of Python's generator random() alone is promised to stay."""
+    """Random draws of one seed, the same on every machine: Python promises this of ``random()`` alone."""
 
     def __init__(self, seed: str) -> None:
         self._random = Generator(seed).random
@@ -154,9 +152,9 @@ class Dice:
         """An integer from 0 to count − 1."""
         return int(count * self._random())
 
-    def pick(self, things: Sequence[_T]) -> _T:
-        """Any of these things."""
-        return things[self.below(len(things))]
+    def pick(self, choices: Sequence[_T]) -> _T:
+        """A random element."""
+        return choices[self.below(len(choices))]
 
     def part(self) -> Fraction:
         """A number of (−1, 1), in thousandths."""
@@ -180,7 +178,7 @@ def unit(values: Sequence[Fraction]) -> Vector:
 
 
 def drawn(seed: int, index: int, family: Family, horizon: Fraction) -> Motion:
-    """Number ``index`` of the random motions: every second one of the first 64 and every eighth beyond are plain."""
+    """Random motion number ``index``: every second of the first 64 and every eighth beyond is a plain random top."""
     case = Random("random", seed, index + 1, "any" if family == "heavy_gyrostat" else family).cases()[index]
     plain = case.top, case.start
     if family == "heavy_gyrostat":
@@ -188,31 +186,32 @@ def drawn(seed: int, index: int, family: Family, horizon: Fraction) -> Motion:
     if is_plain(index):
         return plain
     dice = Dice(f"{seed}/hunt/{index}")
-    return possible(dice.pick(_WAYS)(plain, dice), family, horizon) or plain
+    return possible(dice.pick(_DRAWS)(plain, dice), family, horizon) or plain
 
 
 def is_plain(index: int) -> bool:
-    """Whether that random motion is one of a sweep of random tops."""
+    """Whether random motion number ``index`` is a plain random top."""
     return index % (_PLAIN_EVERY if index < 64 else 8) == 0
 
 
-def changed(one: Motion, other: Motion, seed: str, family: Family, horizon: Fraction) -> Motion:
-    """``one`` with one to three changes; ``other`` may give it its body or its start."""
+def changed(parent: Motion, donor: Motion, seed: str, family: Family, horizon: Fraction) -> Motion:
+    """``parent`` with one to three changes; ``donor`` may give it its body or its start."""
     dice = Dice(seed)
-    motion = one
+    motion = parent
     for _ in range(1 + dice.below(3)):
         if dice.below(8) == 0:
-            motion = (motion[0], other[1]) if dice.below(2) else (other[0], motion[1])
+            motion = (motion[0], donor[1]) if dice.below(2) else (donor[0], motion[1])
         else:
             motion = dice.pick(_CHANGES)(motion, dice)
     if motion[0].rotor is not None and dice.below(3) == 0:
         motion = _rotored(motion, dice)
-    return possible(motion, family, horizon) or one
+    return possible(motion, family, horizon) or parent
 
 
 def possible(motion: Motion, family: Family, horizon: Fraction) -> Motion | None:
-    """The motion in that family with numbers of 40 bits; None where no body has its moments, its data are beyond
-    1e30, or it turns more than :data:`MOST_TURNS` radians.
+    """The motion moved into the family, with numbers of 40 bits.
+
+    None where no body has its moments, where data lie beyond 1e30, or for more than :data:`MOST_TURNS` radians.
     """
     top, start = motion
     inertia, centre = list(top.inertia), list(top.centre)
@@ -222,9 +221,9 @@ def possible(motion: Motion, family: Family, horizon: Fraction) -> Motion | None
         inertia[1], centre[:2] = inertia[0], [Fraction(0)] * 2
     elif family == "kovalevskaya":
         inertia[:2], centre[2] = [2 * inertia[2]] * 2, Fraction(0)
-    rotor = list(map(_short, top.rotor or (Fraction(0),) * 3)) if family == "heavy_gyrostat" else None
-    inertia, centre, omega = (list(map(_short, vector)) for vector in (inertia, centre, start.omega))
-    weight = _short(top.weight)
+    rotor = list(map(_shortened, top.rotor or (Fraction(0),) * 3)) if family == "heavy_gyrostat" else None
+    inertia, centre, omega = (list(map(_shortened, vector)) for vector in (inertia, centre, start.omega))
+    weight = _shortened(top.weight)
     if min(inertia) <= 0 or 2 * max(inertia) > sum(inertia) or max(inertia) > _MOST_RATIO * min(inertia):
         return None
     sizes = [abs(value) for value in (*inertia, weight, *centre, *omega, *(rotor or ())) if value]
@@ -235,23 +234,23 @@ def possible(motion: Motion, family: Family, horizon: Fraction) -> Motion | None
 
 
 def turns(motion: Motion, horizon: Fraction) -> float:
-    """How many radians the motion turns until the horizon, at most: its rate times the time."""
+    """A bound on the radians that the motion turns until the horizon: its rate times the time."""
     top, start = motion
     system = system_of(None, top)
     return float(rate(system, system.parameters(top, start), start.flat) * abs(horizon))
 
 
-def _short(value: Fraction) -> Fraction:
+def _shortened(value: Fraction) -> Fraction:
     """The value, or the nearest of 40 bits where it needs more than twice as many."""
-    long = value.numerator.bit_length() + value.denominator.bit_length() > 2 * _BITS
-    return round_to(value, _BITS) if long else value
+    is_long = value.numerator.bit_length() + value.denominator.bit_length() > 2 * _BITS
+    return round_to(value, _BITS) if is_long else value
 
 
 def _simple(motion: Motion, dice: Dice) -> Motion:
     """Small numbers, zeros and equal moments."""
     moments = dice.pick([(1, 1, 1), (2, 2, 1), (2, 1, 1), (3, 2, 1), (1, 1, 2), (4, 4, 1), (4, 3, 2), (3, 4, 2)])
-    by = dice.below(3)
-    inertia = moments[by:] + moments[:by]
+    shift = dice.below(3)
+    inertia = moments[shift:] + moments[:shift]
     centre = [Fraction(dice.below(5) - 2, 2) for _ in range(3)]
     omega = [Fraction(dice.below(9) - 4, 2) for _ in range(3)]
     top = with_data(motion[0], inertia, 1 + dice.below(3), centre)
@@ -259,7 +258,7 @@ def _simple(motion: Motion, dice: Dice) -> Motion:
 
 
 def _edge(motion: Motion, dice: Dice) -> Motion:
-    """Moments at the edge of the triangle inequality: almost a rod or a disc, or exactly."""
+    """Moments at the edge of the triangle inequality: a rod or a disc, exactly or almost."""
     second = [1 + abs(dice.part()) for _ in range(3)]
     for k in range(1 + dice.below(2)):
         second[(k + dice.below(3)) % 3] *= dice.pick([Fraction(0), dice.power(-5, -2)])
@@ -272,14 +271,14 @@ def _equal(motion: Motion, dice: Dice) -> Motion:
     """Two moments in a small ratio, exactly or nearly."""
     inertia = list(motion[0].inertia)
     i, j = dice.pick([(0, 1), (1, 2), (2, 0), (1, 0), (2, 1), (0, 2)])
-    near = dice.pick([Fraction(0), dice.power(-9, -3)])
-    inertia[i] = inertia[j] * dice.pick([Fraction(1), Fraction(1), Fraction(2), Fraction(3, 2)]) * (1 + near)
+    excess = dice.pick([Fraction(0), dice.power(-9, -3)])
+    inertia[i] = inertia[j] * dice.pick([Fraction(1), Fraction(1), Fraction(2), Fraction(3, 2)]) * (1 + excess)
     inertia[3 - i - j] = (inertia[i] + inertia[j]) * (2 + dice.part()) / 3
     return with_data(motion[0], inertia=inertia), motion[1]
 
 
 def _spun(motion: Motion, dice: Dice) -> Motion:
-    """One component of Ω many times as large, or small; or alone."""
+    """One component of Ω scaled by a power of ten, with the others or alone."""
     top, start = motion
     omega = [Fraction(0)] * 3 if dice.below(3) == 0 else list(start.omega)
     axis = dice.below(3)
@@ -288,7 +287,7 @@ def _spun(motion: Motion, dice: Dice) -> Motion:
 
 
 def _slow(motion: Motion, dice: Dice) -> Motion:
-    """Ω of any smallness, or none."""
+    """A small Ω, down to 0."""
     top, start = motion
     factor = dice.pick([Fraction(0), dice.power(-14, -1)])
     return top, State([value * factor for value in start.omega], start.gamma)
@@ -300,7 +299,7 @@ def _weighed(motion: Motion, dice: Dice) -> Motion:
 
 
 def _scaled(motion: Motion, dice: Dice) -> Motion:
-    """Other units of mass, and the centre as far as it has to be."""
+    """Other units of mass and of the centre of mass, for one motion."""
     top, start = motion
     mass, length = dice.power(-12, 11), dice.power(-6, 5)
     inertia, centre = [mass * value for value in top.inertia], [length * value for value in top.centre]
@@ -318,61 +317,62 @@ def _faster(motion: Motion, dice: Dice) -> Motion:
 def _poled(motion: Motion, dice: Dice) -> Motion:
     """γ along an axis of the body, or near it."""
     top, start = motion
-    near, pole = dice.pick([Fraction(0), dice.power(-12, -1)]), dice.pick(_POLES)
-    return top, State(start.omega, unit([a + near * dice.part() for a in pole]))
+    distance, pole = dice.pick([Fraction(0), dice.power(-12, -1)]), dice.pick(_POLES)
+    return top, State(start.omega, unit([a + distance * dice.part() for a in pole]))
 
 
 def _balanced(motion: Motion, dice: Dice) -> Motion:
-    """Near an equilibrium: Ω = w γ is a permanent rotation, w = 0 rest, where P r = w² I γ + c γ; which of them are
-    saddles, and have separatrices near them, chance decides.
+    """A start near an equilibrium, some of which are saddles with separatrices.
+
+    Ω = w γ is a permanent rotation, or rest for w = 0, where P r = w² I γ + c γ.
     """
     top, start = motion
     gamma = dice.pick([dice.pick(_POLES), start.gamma])
     speed = dice.pick([Fraction(0), Fraction(0), Fraction(1), dice.power(-2, 1)])
     along = dice.pick([Fraction(1), Fraction(-1), Fraction(0), dice.part()])
-    near = dice.pick([Fraction(0), dice.power(-14, -2)])
+    distance = dice.pick([Fraction(0), dice.power(-14, -2)])
     centre = [(speed**2 * i * g + along * g) / (top.weight or 1) for i, g in zip(top.inertia, gamma, strict=True)]
-    return with_data(top, centre=centre), State([speed * g + near * dice.part() for g in gamma], gamma)
+    return with_data(top, centre=centre), State([speed * g + distance * dice.part() for g in gamma], gamma)
 
 
 def _pendulum(motion: Motion, dice: Dice) -> Motion:
     """A plane pendulum near its separatrix: from below, Ω² = 4 P|r|/I."""
     i, j, k = dice.pick([(0, 1, 2), (1, 2, 0), (2, 0, 1)])
-    near = dice.pick([Fraction(0), dice.power(-14, -2)]) * dice.pick([1, -1])
+    excess = dice.pick([Fraction(0), dice.power(-14, -2)]) * dice.pick([1, -1])
     across = dice.pick([Fraction(0), dice.power(-14, -4)])
     centre, omega, gamma = ([Fraction(0)] * 3 for _ in range(3))
-    centre[i], gamma[i], omega[j], omega[k] = Fraction(1), Fraction(-1), 2 + near, across
+    centre[i], gamma[i], omega[j], omega[k] = Fraction(1), Fraction(-1), 2 + excess, across
     return with_data(motion[0], weight=motion[0].inertia[j], centre=centre), State(omega, gamma)
 
 
 def _nudged(motion: Motion, dice: Dice) -> Motion:
-    """Every number a little other."""
+    """A small relative change of every number."""
     top, start = motion
     size = dice.power(-8, -1) / 10
 
-    def near(values: Sequence[Fraction]) -> list[Fraction]:
+    def perturbed(values: Sequence[Fraction]) -> list[Fraction]:
         return [value * (1 + size * dice.part()) for value in values]
 
     gamma = unit([value + size * dice.part() for value in start.gamma])
-    (weight,) = near([top.weight])
-    return with_data(top, near(top.inertia), weight, near(top.centre)), State(near(start.omega), gamma)
+    (weight,) = perturbed([top.weight])
+    return with_data(top, perturbed(top.inertia), weight, perturbed(top.centre)), State(perturbed(start.omega), gamma)
 
 
 def _without(motion: Motion, dice: Dice) -> Motion:
-    """A component of the centre or of Ω is 0, or has the other sign."""
+    """A component of the centre or of Ω set to 0, or its sign changed."""
     top, start = motion
     centre, omega = list(top.centre), list(start.omega)
     dice.pick([centre, omega])[dice.below(3)] *= dice.pick([0, -1])
     return with_data(top, centre=centre), State(omega, start.gamma)
 
 
-def _turned(motion: Motion, dice: Dice) -> Motion:
-    """The axes of the body or of the start called otherwise."""
+def _permuted(motion: Motion, dice: Dice) -> Motion:
+    """The axes of the body, or of the start, permuted cyclically."""
     top, start = motion
-    by = 1 + dice.below(2)
+    shift = 1 + dice.below(2)
 
     def cycled(values: Vector) -> list[Fraction]:
-        return [values[(i + by) % 3] for i in range(3)]
+        return [values[(i + shift) % 3] for i in range(3)]
 
     if dice.below(2):
         rotor = None if top.rotor is None else cycled(top.rotor)
@@ -381,7 +381,7 @@ def _turned(motion: Motion, dice: Dice) -> Motion:
 
 
 def _rotored(motion: Motion, dice: Dice) -> Motion:
-    """A rotor of any size along any of the axes, or none."""
+    """A rotor with random components, down to 0."""
     top, start = motion
     size = max(top.inertia) * dice.pick([Fraction(0), Fraction(1), Fraction(1), Fraction(1), dice.power(-12, 1)])
     rotor = [size * dice.pick([Fraction(0), dice.part(), dice.part()]) for _ in range(3)]
@@ -395,36 +395,36 @@ def with_data(
     centre: Sequence[Any] | None = None,
     rotor_times: Fraction | int = 1,
 ) -> HeavyTop:
-    """The top with other data; a rotor that it has times a number."""
+    """The top with other data, its rotor times a number."""
     rotor = None if top.rotor is None else [rotor_times * value for value in top.rotor]
     return HeavyTop(inertia or top.inertia, top.weight if weight is None else weight, centre or top.centre, rotor)
 
 
-Way = Callable[[Motion, Dice], Motion]
-_WAYS: tuple[Way, ...] = (
+Change = Callable[[Motion, Dice], Motion]
+_DRAWS: tuple[Change, ...] = (
     _simple, _edge, _equal, _spun, _slow, _weighed, _scaled, _faster, _poled, _balanced, _balanced, _pendulum,
 )  # fmt: skip
-_CHANGES: tuple[Way, ...] = (
-    _edge, _equal, _spun, _slow, _weighed, _scaled, _faster, _poled, _balanced, _nudged, _nudged, _without, _turned,
+_CHANGES: tuple[Change, ...] = (
+    _edge, _equal, _spun, _slow, _weighed, _scaled, _faster, _poled, _balanced, _nudged, _nudged, _without, _permuted,
 )  # fmt: skip
 
 
 SAMPLES = 10
 _MORE_BITS = 17
-"""The second start is so many bits nearer than a rounding of the format: its distance stays small on the way."""
-_WHERE = tuple(Fraction(n, 1000) for n in (427, -331, 373, 461, -397, 433))
-"""The direction of the second start, a unit vector nearly, in no plane that a symmetric body knows."""
+"""Bits by which the second start is nearer than a rounding of the format: its distance stays small on the way."""
+_DIRECTION = tuple(Fraction(n, 1000) for n in (427, -331, 373, 461, -397, 433))
+"""The direction of the second start: nearly a unit vector, in no plane of symmetry of a body."""
 _STEP_LIMIT = 1_000_000
 _LEAST = 1e-300
 
 
 @dataclass(frozen=True, slots=True)
 class MeasuredMotion:
-    """A motion and what an integrator made of it.
+    """A motion with the error of an integrator on it.
 
-    outcome: of its run; "" where the truth is unknown, and nothing can be said.  error: infinite of a run that did not
-    reach its horizon.  amplification: of the motion.  turns: its rate times the horizon.
-    other: the error of the integrator that it is compared with, None where absent.
+    outcome: of its run; "" where the true motion is unknown, so that nothing is measured.  error: infinite for a run
+    that did not reach its horizon.  amplification: of the motion.  turns: its rate times the horizon.
+    other: the error of the integrator that it is compared with, None without one.  reason: why the run was aborted.
     """
 
     motion: Motion
@@ -433,15 +433,15 @@ class MeasuredMotion:
     amplification: float
     turns: float
     other: float | None = None
-    said: str = ""
+    reason: str = ""
 
     def explained(self, eps: float) -> float:
-        """The error of a stable method whose every radian costs an eps: eps times amplification, times √turns."""
+        """The error of a stable method that makes an error of eps in each radian: eps · amplification · √turns."""
         return eps * self.amplification * math.sqrt(1 + self.turns)
 
 
 class Meter:
-    """Measures motions with one integrator, and with the one that it is compared with."""
+    """The measurement of motions with one integrator, and with the one that it is compared with."""
 
     def __init__(
         self, integrator: Integrator, precision: Precision, horizon: Fraction, against: Integrator | None
@@ -451,43 +451,47 @@ class Meter:
         self._fine = DOUBLE_DOUBLE if precision == DOUBLE else real(2 * precision.bits)
         python = is_third_party(integrator.name) and not isinstance(integrator.source, Command)
         self._shift = Fraction(1, 2 ** (precision.bits + _MORE_BITS))
-        self._apart = Apart(integrator, SECONDS) if python else None
+        self._isolated = IsolatedIntegrator(integrator) if python else None
 
     def close(self) -> None:
         """End the process of a third-party integrator."""
-        if self._apart is not None:
-            self._apart.end()
+        if self._isolated is not None:
+            self._isolated.end()
+
+    def problem(self, motion: Motion) -> Problem:
+        """The motion in the format."""
+        return Problem.of(*motion, self.precision, system_of(None, motion[0]))
 
     def measure(self, motions: Sequence[Motion]) -> list[MeasuredMotion]:
-        """Each of them, in order; the bits of one do not depend on the others."""
+        """The measurements, in the order of the motions; none depends on the others."""
         if not motions:
             return []
-        problems = [Problem.of(*motion, self.precision, system_of(None, motion[0])) for motion in motions]
+        problems = list(map(self.problem, motions))
         rates = [rate(problem.system, problem.parameters, problem.start.flat) for problem in problems]
-        truths = self._truths(problems, rates)
+        references = self._references(problems, rates)
         runs = self._runs(self.integrator, problems, motions)
         others = [] if self.against is None else self._runs(self.against, problems, motions)
         measured = []
-        for i, (motion, unit, (true, grown), run) in enumerate(zip(motions, rates, truths, runs, strict=True)):
+        for i, (motion, unit, (true, growth), run) in enumerate(zip(motions, rates, references, runs, strict=True)):
             turns = float(unit * abs(self.horizon))
-            other = self._error(others[i], true, unit) if others and true else None
-            if not true:
-                measured.append(MeasuredMotion(motion, "", 0.0, grown, turns))
-            else:
-                error = self._error(run, true, unit)
-                outcome = Outcome.NON_FINITE.value if math.isinf(error) and not _failed(run) else run.outcome
-                measured.append(MeasuredMotion(motion, outcome, error, grown, turns, other, run.said))
+            if true is None:
+                measured.append(MeasuredMotion(motion, "", 0.0, growth, turns))
+                continue
+            error = _error(run, true, unit)
+            outcome = Outcome.NON_FINITE.value if math.isinf(error) and not _failed(run) else run.outcome
+            other = _error(others[i], true, unit) if others else None
+            measured.append(MeasuredMotion(motion, outcome, error, growth, turns, other, run.reason))
         return measured
 
     def run_of(self, integrator: Integrator, motion: Motion) -> IntegratedRun:
         """One run of the integrator that is hunted, or of another."""
-        if integrator == self.integrator and self._apart is not None:
-            return self._apart.follow(*motion, self.times, self.precision)
-        return follow(integrator, *motion, self.times, self.precision)
+        if integrator == self.integrator and self._isolated is not None:
+            return self._isolated.run(*motion, self.times, self.precision)
+        return integrated(integrator, *motion, self.times, self.precision)
 
     def sharper(self, motion: MeasuredMotion) -> MeasuredMotion:
-        """The motion with the amplification over all directions and from every time on."""
-        problem = Problem.of(*motion.motion, self.precision, system_of(None, motion.motion[0]))
+        """The motion with its amplification over all directions, between any two times."""
+        problem = self.problem(motion.motion)
         largest = amplification(problem.system, problem.parameters, problem.start.flat, self.horizon)
         return replace(motion, amplification=max(largest, motion.amplification))
 
@@ -499,47 +503,45 @@ class Meter:
             return [IntegratedRun(run.outcome.value, run.states) for run in runs]
         return [self.run_of(integrator, motion) for motion in motions]
 
-    def _truths(
+    def _references(
         self, problems: Sequence[Problem], rates: Sequence[Fraction]
     ) -> list[tuple[list[list[Fraction]] | None, float]]:
-        """The true states and the amplification of each; None where no run reached the horizon."""
+        """The true states and the amplification of each motion; None where no run reached the horizon."""
         fine = [replace(problem, precision=self._fine) for problem in problems]
         moved = [
             replace(problem, start=_moved(problem.start, unit, self._shift))
             for problem, unit in zip(fine, rates, strict=True)
         ]
-        runs = self._finely([*fine, *moved])
-        truths: list[tuple[list[list[Fraction]] | None, float]] = []
-        for i, unit in enumerate(rates):
-            one, two = runs[i], runs[len(fine) + i]
-            if one is None:
-                truths.append((None, math.inf))
-                continue
-            grown = math.inf if two is None else _growth(one, two, unit, self._shift)
-            truths.append((one, max(1.0, grown)))
-        return truths
+        states = self._fine_states([*fine, *moved])
+        references = []
+        for unit, true, other in zip(rates, states, states[len(fine) :], strict=False):
+            growth = math.inf if true is None or other is None else _growth(true, other, unit, self._shift)
+            references.append((true, max(1.0, growth)))
+        return references
 
-    def _finely(self, problems: Sequence[Problem]) -> list[list[list[Fraction]] | None]:
+    def _fine_states(self, problems: Sequence[Problem]) -> list[list[list[Fraction]] | None]:
+        """The states of runs in twice the digits; None for a run that does not reach the horizon."""
         times = [number(time, self._fine) for time in self.times]
         try:
             runs = propagate_multiword_ensemble(problems, times, threads=1, step_limit=_STEP_LIMIT)
         except OutOfReach:
             return [None] * len(problems)
-        done = [run.outcome is Outcome.SUCCESS for run in runs]
         return [
-            [[exact(value) for value in state] for state in run.states] if reached else None
-            for run, reached in zip(runs, done, strict=True)
+            [list(map(exact, state)) for state in run.states] if run.outcome is Outcome.SUCCESS else None
+            for run in runs
         ]
 
-    def _error(self, run: IntegratedRun, true: Sequence[Sequence[Fraction]], unit: Fraction) -> float:
-        """The largest over the samples; infinite where the run did not reach the last, or is not a number."""
-        if _failed(run):
-            return math.inf
-        try:
-            states = [[exact(value) for value in state[:6]] for state in run.states]
-        except InputError:  # nan and infinity
-            return math.inf
-        return max(map(lambda one, two: _distance(one, two, unit), states, true))
+
+def _error(run: IntegratedRun, true: Sequence[Sequence[Fraction]], unit: Fraction) -> float:
+    """The largest error over the samples; infinite where the run did not reach the last, or is not finite."""
+    if _failed(run):
+        return math.inf
+    try:
+        states = [[exact(value) for value in state[:6]] for state in run.states]
+    except InputError:  # nan and infinity
+        return math.inf
+    distances = ([abs(a - b) for a, b in zip(*pair, strict=False)] for pair in zip(states, true, strict=False))
+    return max(max(float(max(d[:3]) / (unit or 1)), float(max(d[3:])), _LEAST) for d in distances)
 
 
 def _failed(run: IntegratedRun) -> bool:
@@ -548,28 +550,23 @@ def _failed(run: IntegratedRun) -> bool:
 
 def _moved(start: State, unit: Fraction, shift: Fraction) -> State:
     scale = [unit or Fraction(1)] * 3 + [Fraction(1)] * 3
-    flat = [value + shift * size * by for value, size, by in zip(start.flat, scale, _WHERE, strict=True)]
+    flat = [value + shift * size * part for value, size, part in zip(start.flat, scale, _DIRECTION, strict=True)]
     return State(flat[:3], flat[3:])
 
 
 def _growth(
-    one: Sequence[Sequence[Fraction]], two: Sequence[Sequence[Fraction]], unit: Fraction, shift: Fraction
+    states: Sequence[Sequence[Fraction]], others: Sequence[Sequence[Fraction]], unit: Fraction, shift: Fraction
 ) -> float:
-    """How many times as far apart the two runs are as at the start, at most over the samples."""
+    """The largest distance of two runs over the samples, divided by that of their starts."""
     scale = [float(unit or 1)] * 3 + [1.0] * 3
     largest = 0.0
-    for first, second in zip(one, two, strict=True):
-        parts = [float(a - b) / size for a, b, size in zip(first, second, scale, strict=True)]
+    for state, other in zip(states, others, strict=True):
+        parts = [float(a - b) / size for a, b, size in zip(state, other, scale, strict=True)]
         largest = max(largest, math.hypot(*parts))
-    return largest / float(shift) / math.hypot(*map(float, _WHERE))
+    return largest / float(shift) / math.hypot(*map(float, _DIRECTION))
 
 
-def _distance(one: Sequence[Any], two: Sequence[Any], unit: Fraction) -> float:
-    apart = [abs(a - b) for a, b in zip(one, two, strict=True)]
-    return max(float(max(apart[:3]) / (unit or 1)), float(max(apart[3:])), _LEAST)
-
-
-# What is special about a motion, in sentences, and the name of its class.
+# The special features of a motion in sentences, and the name of its class.
 
 
 NO_CLASS = "no closed form"
@@ -579,7 +576,7 @@ _FAST = 20.0
 
 
 def class_of(top: HeavyTop, start: State) -> str:
-    """The closed form that the motion has."""
+    """The method of the motion's closed form."""
     try:
         solution = next(matches(top, start, system_of(None, top)), None)
     except HeavyTopError:
@@ -588,9 +585,9 @@ def class_of(top: HeavyTop, start: State) -> str:
 
 
 def special(motion: MeasuredMotion) -> list[str]:
-    """Sentences: moments, spin, equilibrium, separatrix, energy, what the motion amplifies; the telling ones alone."""
+    """Sentences on moments, spin, equilibrium, separatrix, energy and amplification, where these are special."""
     top, start = motion.motion
-    return [text for text in (*_moments(top), *_start(top, start), *_growth_text(motion)) if text]
+    return [*_moments(top), *_start(top, start), *_amplification(motion)]
 
 
 def _moments(top: HeavyTop) -> list[str]:
@@ -598,11 +595,11 @@ def _moments(top: HeavyTop) -> list[str]:
     for i, j in ((0, 1), (1, 2), (0, 2)):
         a, b = sorted((top.inertia[i], top.inertia[j]), reverse=True)
         ratio = round(a / b)
-        off = float(a / b / ratio - 1)
-        if ratio <= 3 and abs(off) < _NEAR * 20:
+        excess = float(a / b / ratio - 1)
+        if ratio <= 3 and abs(excess) < _NEAR * 20:
             names = (i, j) if top.inertia[i] == a else (j, i)
-            near = "" if off == 0 else f" but for {abs(off):.1g}"
-            sentences.append(f"I{names[0] + 1}/I{names[1] + 1} = {ratio}{near}")
+            difference = "" if excess == 0 else f" but for {abs(excess):.1g}"
+            sentences.append(f"I{names[0] + 1}/I{names[1] + 1} = {ratio}{difference}")
     slack = float((sum(top.inertia) - 2 * max(top.inertia)) / max(top.inertia))
     if slack < _NEAR * 20:
         sentences.append("at the edge of the triangle inequality" + (f", {slack:.1g} from it" if slack else ""))
@@ -617,16 +614,16 @@ def _start(top: HeavyTop, start: State) -> list[str]:
     parameters = system.parameters(top, start)
     pull = dot(top.moment, top.moment)
     spin = math.sqrt(dot(start.omega, start.omega))
-    own = math.sqrt(math.sqrt(pull) / float(min(top.inertia)))
+    swing = math.sqrt(math.sqrt(pull) / float(min(top.inertia)))
     sentences = []
-    if spin == 0 or own == 0:
+    if spin == 0 or swing == 0:
         sentences.append("Ω = 0" if spin == 0 else "no torque of the weight")
-    elif spin > _FAST * own:
-        sentences.append(f"spins {spin / own:.3g} times as fast as its weight swings it")
-    elif own > _FAST * spin:
-        sentences.append(f"slow: Ω is {spin / own:.2g} of what its weight makes of it")
+    elif spin > _FAST * swing:
+        sentences.append(f"spins {spin / swing:.3g} times as fast as its weight swings it")
+    elif swing > _FAST * spin:
+        sentences.append(f"slow: Ω is {spin / swing:.2g} of what its weight makes of it")
     field = [abs(value) for value in system.field(parameters.mapped(Fraction), start.flat)]
-    unit = spin + own or 1.0
+    unit = spin + swing or 1.0
     speed = max(float(max(field[:3])) / unit**2, float(max(field[3:])) / unit)
     if not any(field):
         sentences.append("an equilibrium")
@@ -639,7 +636,7 @@ def _start(top: HeavyTop, start: State) -> list[str]:
     return [*sentences, f"energy {float(energy):.4g}, P|r| = {height:.4g}"]
 
 
-def _growth_text(motion: MeasuredMotion) -> list[str]:
+def _amplification(motion: MeasuredMotion) -> list[str]:
     chaotic = motion.amplification > 100 * (1 + motion.turns)
     kind = ", more than a regular motion does: near a separatrix, or chaotic" if chaotic else ""
     sentences = [f"{motion.turns:.3g} radians until the horizon"]

@@ -1,4 +1,4 @@
-"""The search itself: random motions, then changes of the worst, until something is found or the budget is used up."""
+"""The search: random motions, then changes of the worst, until something is found or the budget is used up."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
+from functools import cache, partial
 from itertools import product
 from math import gcd
 from pathlib import Path
@@ -48,11 +48,11 @@ from heavytop.top.amplification import rate
 from heavytop.top.equations import GYROSTAT, system_of
 from heavytop.top.heavy_top import HeavyTop, State, data_texts
 
-# The simplest data that still show what was found: zeros, equal moments, numbers of few digits.
+# Shrinking: the simplest data that still show the fault, with zeros, equal moments and numbers of few digits.
 
 
 Shows = Callable[[Sequence[Motion]], list[bool]]
-"""Which of the motions show it."""
+"""Whether each of the motions shows the fault."""
 _MOST_ROUNDS = 12
 _TOGETHER = 8
 _DIRECTION_NORMS = (1, 2, 3, 5, 7, 9, 11, 13, 15, 17, 25, 33, 51, 65, 99, 201, 301, 451, 651, 901, 999)
@@ -60,45 +60,44 @@ _MOST_DENOMINATOR = 31
 
 
 def digits(value: Fraction) -> int:
-    """Significant digits of a number as it is written: 0 of 0, 1 of 5000 and of 1e-8, 2 of 3/2."""
+    """The significant digits that a number is written with: 0 of 0, 1 of 5000 and of 1e-8, 2 of 3/2."""
     text = shown(value).lstrip("-").partition("e")[0]
     return sum(len(part.replace(".", "").strip("0")) for part in text.split("/"))
 
 
 def complexity(motion: Motion) -> tuple[int, int, int]:
-    """The measure that shrinking lowers: digits, numbers that are neither 0 nor 1, different numbers and signs."""
+    """The measure that shrinking lowers: digits; numbers other than 0 and 1, different moments; lengths and signs."""
     top, start = motion
     values = [*top.inertia, top.weight, *top.centre, *(top.rotor or ()), *start.omega, *start.gamma]
-    odd = sum(value not in (0, 1) for value in values)
-    sizes = sum(len(shown(value)) for value in values) + sum(value < 0 for value in values)
-    return sum(map(digits, values)), odd + len(set(top.inertia)), sizes
+    numbers = sum(value not in (0, 1) for value in values)
+    lengths = sum(len(shown(value)) for value in values) + sum(value < 0 for value in values)
+    return sum(map(digits, values)), numbers + len(set(top.inertia)), lengths
 
 
 def shrunk(motion: Motion, shows: Shows) -> Motion:
-    """A motion that shows the same and of which no single change that is tried makes a simpler one that does."""
+    """A motion that shows the same fault and that no single change makes simpler without losing it."""
     for _ in range(_MOST_ROUNDS):
         before = complexity(motion)
         for change in _CHANGES:
-            motion = _first(motion, change(motion), shows)
+            motion = _first_that_shows(motion, change(motion), shows)
         if complexity(motion) >= before:
             break
     return motion
 
 
-def _first(motion: Motion, simpler: Iterator[Motion], shows: Shows) -> Motion:
-    """The first of those, the simplest first, that is simpler and shows it; else the motion itself."""
-    here = complexity(motion)
-    waiting = sorted((candidate for candidate in simpler if complexity(candidate) < here), key=complexity)
-    for begin in range(0, len(waiting), _TOGETHER):
-        group = waiting[begin : begin + _TOGETHER]
-        for candidate, good in zip(group, shows(group), strict=True):
-            if good:
-                return candidate
+def _first_that_shows(motion: Motion, candidates: Iterator[Motion], shows: Shows) -> Motion:
+    """The simplest candidate that is simpler than the motion and shows the fault; else the motion itself."""
+    limit = complexity(motion)
+    simpler = sorted((candidate for candidate in candidates if complexity(candidate) < limit), key=complexity)
+    for begin in range(0, len(simpler), _TOGETHER):
+        group = simpler[begin : begin + _TOGETHER]
+        if (shown_by := shows(group)) and any(shown_by):
+            return group[shown_by.index(True)]
     return motion
 
 
-def _of_body(motion: Motion) -> Iterator[Motion]:
-    """Whole bodies: small integers in place of the moments, no centre, one along an axis, weight 1."""
+def _simpler_bodies(motion: Motion) -> Iterator[Motion]:
+    """Bodies with small integers as moments, without a centre, with one along an axis, with weight 1."""
     top, start = motion
     for inertia in product((1, 2, 3, 4), repeat=3):
         if 2 * max(inertia) <= sum(inertia):
@@ -110,8 +109,8 @@ def _of_body(motion: Motion) -> Iterator[Motion]:
         yield with_data(top, top.inertia, 1, [top.weight * value for value in centre]), start
 
 
-def _of_units(motion: Motion) -> Iterator[Motion]:
-    """Other units of mass and length for one motion."""
+def _other_units(motion: Motion) -> Iterator[Motion]:
+    """The motion in other units of mass and length."""
     top, start = motion
     for unit in {value for value in top.inertia if value != 1}:
         inertia = [value / unit for value in top.inertia]
@@ -120,8 +119,8 @@ def _of_units(motion: Motion) -> Iterator[Motion]:
     yield with_data(top, top.inertia, 1, [top.weight * value for value in top.centre]), start
 
 
-def _of_start(motion: Motion) -> Iterator[Motion]:
-    """Ω none, or along one axis, and γ on the poles."""
+def _simpler_starts(motion: Motion) -> Iterator[Motion]:
+    """Starts with Ω = 0 or along one axis, and with γ at a pole."""
     top, start = motion
     for axis in range(3):
         omega = [value if i == axis else Fraction(0) for i, value in enumerate(start.omega)]
@@ -134,61 +133,58 @@ def _of_start(motion: Motion) -> Iterator[Motion]:
     yield top, State((0, 0, 0), start.gamma)
 
 
-def _of_inertia(motion: Motion) -> Iterator[Motion]:
-    """One moment, or two together."""
+def _simpler_moments(motion: Motion) -> Iterator[Motion]:
+    """Bodies with a simpler number for one moment, or for two equal ones."""
     top, start = motion
     for i, value in enumerate(top.inertia):
-        for simple in _simpler(value):
+        for simple in _simpler_numbers(value):
             if simple > 0:
-                for also in ((i,), (i, (i + 1) % 3), (i, (i + 2) % 3)):
-                    inertia = [simple if k in also else moment for k, moment in enumerate(top.inertia)]
+                for indices in ((i,), (i, (i + 1) % 3), (i, (i + 2) % 3)):
+                    inertia = [simple if k in indices else moment for k, moment in enumerate(top.inertia)]
                     if 2 * max(inertia) <= sum(inertia):
                         yield with_data(top, inertia, top.weight, top.centre), start
 
 
-def _of_number(index: int) -> Callable[[Motion], Iterator[Motion]]:
-    """The weight, a component of the centre or of Ω."""
-
-    def change(motion: Motion) -> Iterator[Motion]:
-        top, start = motion
-        numbers = [top.weight, *top.centre, *start.omega]
-        for simple in _simpler(numbers[index]):
-            weight, *vectors = _replaced(numbers, index, simple)
-            yield with_data(top, top.inertia, weight, vectors[:3]), State(vectors[3:], start.gamma)
-
-    return change
+def _simpler_datum(index: int, motion: Motion) -> Iterator[Motion]:
+    """Motions with a simpler weight, or component of the centre or of Ω."""
+    top, start = motion
+    numbers = [top.weight, *top.centre, *start.omega]
+    for simple in _simpler_numbers(numbers[index]):
+        weight, *vectors = _replaced(numbers, index, simple)
+        yield with_data(top, top.inertia, weight, vectors[:3]), State(vectors[3:], start.gamma)
 
 
 def _replaced(values: Sequence[Fraction], index: int, value: Fraction) -> list[Fraction]:
-    return [value if i == index else old for i, old in enumerate(values)]
+    return [*values[:index], value, *values[index + 1 :]]
 
 
-def _of_rotor(motion: Motion) -> Iterator[Motion]:
-    """None of it, or one component simpler."""
+def _simpler_rotors(motion: Motion) -> Iterator[Motion]:
+    """Bodies whose rotor is 0, or simpler in one component."""
     top, start = motion
     if top.rotor is not None:
         yield with_data(top, rotor_times=0), start
         for index, value in enumerate(top.rotor):
-            for simple in _simpler(value):
+            for simple in _simpler_numbers(value):
                 yield HeavyTop(top.inertia, top.weight, top.centre, _replaced(top.rotor, index, simple)), start
 
 
-def _of_gamma(motion: Motion) -> Iterator[Motion]:
-    """The nearest unit vector of each of some denominators, to three digits."""
+def _near_directions(motion: Motion) -> Iterator[Motion]:
+    """Starts with the nearest rational γ up to each of some denominators."""
     top, start = motion
     table = _directions()
     norms = table[:, 0]
-    apart = numpy.abs(table[:, 1:] / table[:, :1] - numpy.array([float(value) for value in start.gamma])).max(axis=1)
-    nearest = (int(apart[: int((norms <= most).sum())].argmin()) for most in _DIRECTION_NORMS)
-    for axis in dict.fromkeys(nearest):
-        norm, *parts = table[axis].tolist()
+    distances = numpy.abs(table[:, 1:] / table[:, :1] - numpy.array(start.gamma, float)).max(axis=1)
+    nearest = (int(distances[: int((norms <= most).sum())].argmin()) for most in _DIRECTION_NORMS)
+    for row in dict.fromkeys(nearest):
+        norm, *parts = table[row].tolist()
         yield top, State(start.omega, [Fraction(part, norm) for part in parts])
 
 
 @cache
 def _directions() -> Any:
-    """Unit vectors with numerators and denominators of at most three digits: integers, shape (n, 4), each the common
-    denominator, in order, and three numerators.
+    """Rational unit vectors with numbers of at most three digits: integers, shape (n, 4), by their denominators.
+
+    Each row has the common denominator and three numerators.
     """
     directions: dict[tuple[int, int, int, int], None] = {}
     for n in range(1, _MOST_DENOMINATOR + 1):
@@ -203,8 +199,8 @@ def _directions() -> Any:
     return numpy.array(sorted(directions, key=lambda entry: entry[0]))
 
 
-def _simpler(value: Fraction) -> list[Fraction]:
-    """Simpler numbers: 0, ±1, integers, halves, fractions and decimals of one, two and three digits."""
+def _simpler_numbers(value: Fraction) -> list[Fraction]:
+    """Simpler numbers near the value: 0, ±1, integers, small fractions, decimals of one, two and three digits."""
     candidates = {Fraction(0), Fraction(1), Fraction(-1), abs(value)}
     if abs(value) < 1000:
         candidates |= {Fraction(round(value) + k) for k in (-1, 0, 1)}
@@ -217,26 +213,25 @@ def _simpler(value: Fraction) -> list[Fraction]:
 
 
 _CHANGES: tuple[Callable[[Motion], Iterator[Motion]], ...] = (
-    _of_body,
-    _of_start,
-    _of_units,
-    _of_gamma,
-    _of_inertia,
-    *map(_of_number, range(7)),
-    _of_rotor,
+    _simpler_bodies,
+    _simpler_starts,
+    _other_units,
+    _near_directions,
+    _simpler_moments,
+    *(partial(_simpler_datum, index) for index in range(7)),
+    _simpler_rotors,
 )
 
 
-# The error of a found motion, proven: against a closed form or the enclosure, whose balls hold the true motion.
+# The proven error of a finding: against a closed form or the enclosure, whose balls contain the true motion.
 
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """The proof of a found motion.
+    """The error of a finding against the best known true motion.
 
-    error: at least so large, where the truth is proven; as computed, where it is not.  other: that of the integrator
-    that it is shown beside; None where that is unknown.  against: how the true motion is known.
-    proven: whether by a theorem.
+    error: a lower bound where the true motion is proven, else the computed error.  other: the same for the integrator
+    shown with it; None where that is unknown.  against: how the true motion is known.  proven: whether by a theorem.
     """
 
     error: float
@@ -246,11 +241,11 @@ class Proof:
 
 
 def proof(meter: Meter, motion: MeasuredMotion, other: Integrator) -> Proof:
-    """The error of a found motion and of ``other`` on it, against the best that is known of it.
+    """The errors of the hunted integrator and of ``other`` on a finding.
 
     Raises Contradiction where two proofs exclude each other.
     """
-    problem = Problem.of(*motion.motion, meter.precision, system_of(None, motion.motion[0]))
+    problem = meter.problem(motion.motion)
     known = truth(problem, meter.times)
     runs = [meter.run_of(integrator, motion.motion) for integrator in (meter.integrator, other)]
     if isinstance(known, str):
@@ -261,7 +256,7 @@ def proof(meter: Meter, motion: MeasuredMotion, other: Integrator) -> Proof:
 
 @whole_evaluation
 def _distance(problem: Problem, known: Truth, meter: Meter, run: IntegratedRun) -> float:
-    """max(|δΩ|/rate, |δγ|) over the samples, at least; infinite of a run that was aborted."""
+    """A lower bound of max(|δΩ|/rate, |δγ|) over the samples; infinite for a run that was aborted."""
     if run.outcome != Outcome.SUCCESS.value:
         return math.inf
     bits = problem.precision.bits + GUARD_BITS
@@ -272,20 +267,20 @@ def _distance(problem: Problem, known: Truth, meter: Meter, run: IntegratedRun) 
             if not known.covers(time):
                 break
             try:
-                apart = [to_ball(a) - b for a, b in zip(state[:6], known.state(time, bits), strict=True)]
+                differences = [to_ball(a) - b for a, b in zip(state[:6], known.state(time, bits), strict=True)]
             except (ValueError, TypeError, ArithmeticError):
                 return math.inf
-            if not all(distance.is_finite() for distance in apart):
+            if not all(difference.is_finite() for difference in differences):
                 return math.inf
-            scaled: arb = largest((largest(apart[:3]) / rational(unit), largest(apart[3:])))
+            scaled: arb = largest((largest(differences[:3]) / rational(unit), largest(differences[3:])))
             distance = max(distance, float(scaled.abs_lower()))
     return distance
 
 
 FIRST = 64
-"""Motions that tell the law of the integrator and what a motion costs."""
+"""The number of motions that the law of the integrator and the cost of a motion are measured on."""
 DECADES = 100.0
-"""Beyond so many times what law and amplification explain, an error is found."""
+"""An error that is so many times what law and amplification explain is a finding."""
 _POOL = 24
 _MOST_FOUND = 3
 _MOST_HITS = 16
@@ -293,17 +288,17 @@ _SHOWN = 3
 _SHARPENED = 6
 _LEAST_LAW = 0.05
 _LOST = 0.01
-"""An error that would be explained up to here says nothing: the format has lost all significant digits."""
+"""Where an error of this size would be explained, the format has lost all significant digits."""
 _SPARE = 0.8
-"""Part of a budget in seconds; the rest is for shrinking and proving."""
+"""The part of a budget in seconds for searching; the rest is for shrinking and proving."""
 
 Advance = Callable[[int, int], None]
-"""Told (motions done, motions in all)."""
+"""A function of (motions done, motions in all)."""
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
-    """A search to be made.
+class HuntRequest:
+    """The settings of a search.
 
     budget: motions, or None for ``seconds`` of processor time.  limit: in eps T^1.5, or the ratio to ``against``; None
     for two decades beyond what is explained.  first: motions that are measured before all others.
@@ -327,23 +322,24 @@ class Asked:
 
     @property
     def other(self) -> Integrator:
-        """The integrator shown beside: heyoka, or multiword where heyoka is hunted or lacks the format."""
+        """The integrator shown with it: heyoka, or multiword where heyoka is hunted or lacks the format."""
         if self.against is not None:
             return self.against
-        own = self.integrator.name == HEYOKA or self.precision.name == "double-double"
-        return described(MULTIWORD if own else HEYOKA)
+        no_heyoka = self.integrator.name == HEYOKA or self.precision.name == "double-double"
+        return described(MULTIWORD if no_heyoka else HEYOKA)
 
 
 @dataclass(frozen=True, slots=True)
 class Hunted:
-    """The result of a search: found motions, shrunk and worst first; the worst that are explained; motions tried.
+    """The result of a search: the findings, shrunk and worst first; the worst motions that are explained.
 
+    motions: how many were tried, of ``planned``.
     law: the error over eps, amplification and √turns that nine tenths of the random tops stay below.
-    median: of the errors of random tops.  unknown: motions whose truth was out of reach.  lost: whose amplification
-    leaves no digit, so that they say nothing.  proofs: of those found, in their order.
+    median: of the errors of random tops.  unknown: the number of motions whose reference was out of reach.
+    lost: the number of motions whose amplification leaves no digit.  proofs: of the findings, in their order.
     """
 
-    asked: Asked
+    request: HuntRequest
     found: tuple[MeasuredMotion, ...]
     worst: tuple[MeasuredMotion, ...]
     motions: int
@@ -355,80 +351,84 @@ class Hunted:
     proofs: tuple[Proof, ...] = ()
 
 
-def hunt(asked: Asked, advance: Advance | None = None) -> Hunted:
-    """Search, and shrink what is found.
+def hunt(request: HuntRequest, advance: Advance | None = None) -> Hunted:
+    """Search, and shrink the findings.
 
     Raises InputError and PeerFailed for an integrator that cannot be used at all.
     """
-    meter = Meter(asked.integrator, asked.precision, asked.horizon, asked.against)
+    meter = Meter(request.integrator, request.precision, request.horizon, request.against)
     try:
-        return _Hunt(asked, meter, advance or (lambda done, of: None)).run()
+        return _Hunt(request, meter, advance or (lambda done, of: None)).run()
     finally:
         meter.close()
 
 
 class _Hunt:
-    def __init__(self, asked: Asked, meter: Meter, advance: Advance) -> None:
-        self.asked, self.meter, self.advance = asked, meter, advance
-        self.eps = float(asked.precision.eps)
+    """The state of a search: all motions measured, the worst of them (pool), plain random tops, findings (hits)."""
+
+    def __init__(self, request: HuntRequest, meter: Meter, advance: Advance) -> None:
+        self.request, self.meter, self.advance = request, meter, advance
+        self.eps = float(request.precision.eps)
         self.law = _LEAST_LAW
-        self.all: list[MeasuredMotion] = []
+        self.measured: list[MeasuredMotion] = []
         self.pool: list[MeasuredMotion] = []
         self.plain: list[MeasuredMotion] = []
         self.hits: list[MeasuredMotion] = []
         self.planned = 0
 
     def run(self) -> Hunted:
-        asked = self.asked
-        kept = self.meter.measure(asked.first) if asked.first else []
+        request = self.request
+        first = self.meter.measure(request.first)
         self._begin()
-        self._take(kept)
+        self._add(first)
         index, batch = FIRST, 0
-        while not self.hits and (done := len(self.all)) < self.planned:
+        while not self.hits and (done := len(self.measured)) < self.planned:
             count = min(FIRST, self.planned - done)
             if batch % 4 < (3 if done < self.planned // 4 else 1):
-                motions = [drawn(asked.seed, index + i, asked.family, asked.horizon) for i in range(count)]
+                motions = list(map(self._drawn, range(index, index + count)))
                 index += count
             else:
                 motions = [self._changed(batch, i) for i in range(count)]
-            self._take(self.meter.measure(motions))
+            self._add(self.meter.measure(motions))
             batch += 1
-            self.advance(len(self.all), self.planned)
-        return self._ended(len(self.all), self._shrunk())
+            self.advance(len(self.measured), self.planned)
+        done = len(self.measured)
+        return self._result(done, self._shrunk())
+
+    def _drawn(self, index: int) -> Motion:
+        return drawn(self.request.seed, index, self.request.family, self.request.horizon)
 
     def _begin(self) -> None:
-        """The first 64 motions: what they cost, the law of the integrator, and whether they show anything."""
-        asked = self.asked
-        self.meter.measure([drawn(asked.seed, 0, asked.family, asked.horizon)] * 2)  # what is compiled, is now
-        motions = [drawn(asked.seed, i, asked.family, asked.horizon) for i in range(FIRST)]
-        if asked.budget is not None:
-            motions = motions[: asked.budget]
+        """Measures the first 64 motions: their cost, and the law of the integrator."""
+        request = self.request
+        self.meter.measure([self._drawn(0)] * 2)  # compilation takes no time of a motion
+        motions = list(map(self._drawn, range(FIRST)))[: request.budget]
         began = process_time()
         first = self.meter.measure(motions)
         cost = max(process_time() - began, 1e-6) / len(motions)
-        if asked.budget is None:
-            assert asked.seconds is not None
-            self.planned = max(FIRST, int(_SPARE * asked.seconds / cost)) + len(asked.first)
-        else:
-            self.planned = asked.budget + len(asked.first)
+        budget = request.budget
+        if budget is None:
+            assert request.seconds is not None
+            budget = max(FIRST, int(_SPARE * request.seconds / cost))
+        self.planned = budget + len(request.first)
         plain = [m for i, m in enumerate(first) if is_plain(i) and m.outcome == "success" and not self._is_lost(m)]
         self.plain = plain or [m for m in first if m.outcome == "success"]
         ratios = sorted(m.error / m.explained(self.eps) for m in self.plain)
         if len(ratios) > 1:
             ninth: float = quantiles(ratios, n=10, method="inclusive")[-1]
             self.law = max(_LEAST_LAW, ninth)
-        self._take(first)
+        self._add(first)
 
     def _changed(self, batch: int, index: int) -> Motion:
-        seed = f"{self.asked.seed}/change/{batch}/{index}"
+        """A change of one of the worst motions: the worse it is, the more often it is chosen."""
+        seed = f"{self.request.seed}/change/{batch}/{index}"
         dice = Dice(f"{seed}/which")
-        # the worse, the oftener
-        one = self.pool[min(dice.below(len(self.pool)), dice.below(len(self.pool)))]
-        other = dice.pick(self.pool)
-        return changed(one.motion, other.motion, seed, self.asked.family, self.asked.horizon)
+        parent = self.pool[min(dice.below(len(self.pool)), dice.below(len(self.pool)))]
+        donor = dice.pick(self.pool)
+        return changed(parent.motion, donor.motion, seed, self.request.family, self.request.horizon)
 
-    def _take(self, measured: Sequence[MeasuredMotion]) -> None:
-        self.all += measured
+    def _add(self, measured: Sequence[MeasuredMotion]) -> None:
+        self.measured += measured
         self.pool = sorted([*self.pool, *measured], key=self._score, reverse=True)[:_POOL]
         for motion in sorted(measured, key=self._score, reverse=True):
             if (
@@ -442,42 +442,42 @@ class _Hunt:
         return m.explained(self.eps) * max(self.law, 1.0) > _LOST
 
     def _score(self, m: MeasuredMotion) -> float:
-        """The measure that the search makes large: the error over what is explained, or over that of ``against``."""
+        """The measure that the search increases: the error over what is explained, or over that of ``against``."""
         if not m.outcome or (self._is_lost(m) and not math.isinf(m.error)):
             return 0.0
-        return m.error / max(self._beside(m), 1e-300)
+        return m.error / max(self._compared_error(m), 1e-300)
 
-    def _beside(self, m: MeasuredMotion) -> float:
+    def _compared_error(self, m: MeasuredMotion) -> float:
         explained = m.explained(self.eps)
-        if self.asked.against is None:
+        if self.request.against is None:
             return explained
         return max(m.other or 0.0, _LEAST_LAW * explained)
 
     def exceeds(self, m: MeasuredMotion) -> bool:
-        """Whether its error is found."""
+        """Whether the motion is a finding."""
         if not m.outcome:
             return False
         if math.isinf(m.error):
             return m.other is None or not math.isinf(m.other)
-        limit = self.asked.limit
-        if self.asked.against is not None:
-            return not self._is_lost(m) and m.error > (limit or DECADES) * self._beside(m)
+        limit = self.request.limit
+        if self.request.against is not None:
+            return not self._is_lost(m) and m.error > (limit or DECADES) * self._compared_error(m)
         if limit is not None:
-            return m.error > limit * self.asked.unit
+            return m.error > limit * self.request.unit
         return not self._is_lost(m) and m.error > DECADES * self.law * m.explained(self.eps)
 
     def _shrunk(self) -> list[MeasuredMotion]:
-        """The worst found, shrunk; of several that shrink to the same one."""
+        """The worst findings, shrunk; one of those that shrink to the same motion."""
         simplest: dict[object, MeasuredMotion] = {}
-        worst = sorted(self.hits, key=self._score, reverse=True)[:_MOST_FOUND]
-        for hit in worst:
+        for hit in sorted(self.hits, key=self._score, reverse=True)[:_MOST_FOUND]:
             simple = hit if hit.outcome == OUT_OF_TIME else self._simple(hit)
             simplest.setdefault(_shape(simple.motion), simple)
         return sorted(simplest.values(), key=self._score, reverse=True)[:_SHOWN]
 
     def _simple(self, hit: MeasuredMotion) -> MeasuredMotion:
-        """The simplest that shows the same; the amplification over all directions is asked at the end, and on the way
-        where that did not do.
+        """The simplest motion that shows the same fault.
+
+        The amplification over all directions is computed for the result alone, and for each step where that fails.
         """
         for careful in (False, True):
             (again,) = self.meter.measure([shrunk(hit.motion, self._shows(hit, careful))])
@@ -486,77 +486,79 @@ class _Hunt:
         return hit
 
     def _shows(self, hit: MeasuredMotion, careful: bool) -> Shows:
-        asked = self.asked
+        request = self.request
 
         def shows(motions: Sequence[Motion]) -> list[bool]:
-            good = [possible(motion, asked.family, asked.horizon) == motion for motion in motions]
-            tried = iter(self.meter.measure([m for m, ok in zip(motions, good, strict=True) if ok]))
-            return [ok and self._as_bad(next(tried), hit, careful) for ok in good]
+            valid = [m for m in motions if possible(m, request.family, request.horizon) == m]
+            bad = [m.motion for m in self.meter.measure(valid) if self._as_bad(m, hit, careful)]
+            return [motion in bad for motion in motions]
 
         return shows
 
     def _as_bad(self, m: MeasuredMotion, hit: MeasuredMotion, careful: bool) -> bool:
-        """Whether it is found, and in the same way: a failure does not become an error."""
+        """Whether it is a finding of the same kind: a failure, or an error."""
         same = math.isinf(m.error) == math.isinf(hit.error) and self.exceeds(m)
         return same and (not careful or self.exceeds(self.meter.sharper(m)))
 
-    def _ended(self, done: int, motions: list[MeasuredMotion]) -> Hunted:
-        good = [m for m in self.all if m.outcome == "success" and not self._is_lost(m)]
+    def _result(self, done: int, motions: list[MeasuredMotion]) -> Hunted:
+        good = [m for m in self.measured if m.outcome == "success" and not self._is_lost(m)]
         ordered = sorted(good, key=lambda m: m.error, reverse=True)
         sharp = map(self.meter.sharper, list({m.motion: m for m in ordered[:_POOL]}.values())[:_SHARPENED])
         worst = [m for m in sharp if not self._is_lost(m)][:_SHOWN]
         middle = median(m.error for m in self.plain) if self.plain else math.inf
-        unknown = sum(not m.outcome for m in self.all)
-        lost = sum(bool(m.outcome) and self._is_lost(m) for m in self.all)
-        proofs = tuple(proof(self.meter, m, self.asked.other) for m in motions)
+        unknown = sum(not m.outcome for m in self.measured)
+        lost = sum(bool(m.outcome) and self._is_lost(m) for m in self.measured)
+        proofs = tuple(proof(self.meter, m, self.request.other) for m in motions)
         return Hunted(
-            self.asked, tuple(motions), tuple(worst), done, self.planned, self.law, middle, unknown, lost, proofs
+            self.request, tuple(motions), tuple(worst), done, self.planned, self.law, middle, unknown, lost, proofs
         )
 
 
 def _shape(motion: Motion) -> object:
-    """A key that motions share which differ in the names and senses of their axes alone, or nearly."""
+    """A key of motions that differ in the order and signs of their axes alone, or nearly."""
     top, start = motion
     vectors = (top.moment, top.rotor or (Fraction(0),) * 3, start.omega, start.gamma)
     axes = zip(top.inertia, *(map(abs, vector) for vector in vectors), strict=True)
     return tuple(sorted(axes))
 
 
-# What a hunt found as texts: data, class, command and table of a plan; and the file that keeps it.
+# The findings of a hunt as texts: data, class, command and table of a plan; and the file of findings.
 
 
 _PASTE = "It holds [[top]] tables, as heavytop hunt prints them."
 
 
 def documents(hunted: Hunted, integrator: str) -> list[dict[str, Any]]:
-    """Each motion found, worst first, by the keys of `hunt --json`; integrator: as the user named it."""
-    asked, entries = hunted.asked, []
-    eps = float(asked.precision.eps)
+    """The findings, worst first, by the keys of `hunt --json`; integrator: as the user named it."""
+    request, entries = hunted.request, []
+    eps = float(request.precision.eps)
     for number, (m, proven) in enumerate(zip(hunted.found, hunted.proofs, strict=True), 1):
         case = case_of(m.motion, number)
-        more = {
+        document = {
+            **data_texts(*m.motion),
             "system": case.system.name,
             "digits_lost": digits_lost(proven.error, eps),
             "ratio": ratio(proven.error, proven.other, eps),
             "outcome": m.outcome,
             "class": class_of(*m.motion),
-            "command": command_of(asked, m.motion, integrator, math.isinf(m.error)),
+            "command": command_of(request, m.motion, integrator, math.isinf(m.error)),
             "toml": forms(case)["toml"],
         }
-        entries.append({**data_texts(*m.motion), **more})
+        entries.append(document)
     return entries
 
 
 def digits_lost(error: float, eps: float) -> float:
-    """Decimal digits of the format that an error costs: all of them without a result."""
+    """Decimal digits of the format that an error costs: all of them for an infinite one."""
     if math.isinf(error):
         return round(-math.log10(eps), 1)
     return round(min(max(math.log10(max(error, eps) / eps), 0.0), -math.log10(eps)), 1)
 
 
 def ratio(error: float, other: float | None, eps: float) -> float | None:
-    """The error over that of another integrator on the same motion, which counts as eps at least; None where one came
-    to nothing.
+    """The error over that of another integrator on the same motion, or over eps where that is larger.
+
+    None where one of them is unknown or infinite.
     """
     if other is None or math.isinf(error) or math.isinf(other):
         return None
@@ -568,14 +570,14 @@ def case_of(motion: Motion, number: int) -> Case:
     return Case(f"hunted-{number}", "found by a hunt", system_of(None, motion[0]), *motion)
 
 
-def command_of(asked: Asked, motion: Motion, integrator: str, failed: bool) -> str:
-    """The command that shows it again: the digits that are right, or how the run ends."""
-    times = [asked.horizon * i / 10 for i in range(1, 11)]
-    return rerun(case_of(motion, 1), times, asked.precision.name, integrator, reached=not failed)
+def command_of(request: HuntRequest, motion: Motion, integrator: str, failed: bool) -> str:
+    """The command that shows a finding again: the correct digits, or how the run ends."""
+    times = [request.horizon * i / 10 for i in range(1, 11)]
+    return rerun(case_of(motion, 1), times, request.precision.name, integrator, reached=not failed)
 
 
 def kept(path: Path) -> tuple[Motion, ...]:
-    """The motions that a file keeps, none before the file exists; raises InputError for any other file."""
+    """The motions in a file of findings, none before the file exists; raises InputError for any other file."""
     try:
         document = document_of(path.read_text("utf-8"))
         if document.keys() - {"top"}:
@@ -593,10 +595,10 @@ def kept(path: Path) -> tuple[Motion, ...]:
 
 
 def keep(path: Path, motions: Sequence[Motion]) -> None:
-    """Add motions to the file that are not in it; raises InputError where it cannot be written."""
-    before = kept(path)
-    every = dict.fromkeys([*map(_plain, before), *map(_plain, motions)])
-    if len(every) == len(before):
+    """Add new motions to a file of findings; raises InputError where it cannot be written."""
+    known = kept(path)
+    every = dict.fromkeys(map(_without_mass, [*known, *motions]))
+    if len(every) == len(known):
         return
     tables = [forms(case_of(motion, i))["toml"] for i, motion in enumerate(every, 1)]
     try:
@@ -605,6 +607,6 @@ def keep(path: Path, motions: Sequence[Motion]) -> None:
         raise InputError(f"{path} cannot be written: {error.strerror}.", "Give a file that can be.") from None
 
 
-def _plain(motion: Motion) -> Motion:
+def _without_mass(motion: Motion) -> Motion:
     top, start = motion
     return HeavyTop(top.inertia, top.weight, top.centre, top.rotor), start

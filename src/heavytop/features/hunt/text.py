@@ -16,7 +16,7 @@ _WIDTH = 80
 
 
 def hunt_text(hunted: Hunted, documents: Sequence[dict[str, Any]], again: str) -> str:
-    """Each motion found with its table; else the worst and what explains it.  again: the command that searches so."""
+    """The findings with their tables; else the worst motions and what explains them.  again: the command."""
     lines = [_searched(hunted), ""]
     for number, (document, m, p) in enumerate(zip(documents, hunted.found, hunted.proofs, strict=True), 1):
         lines += [*_found(hunted, number, document, m, p), ""]
@@ -26,7 +26,7 @@ def hunt_text(hunted: Hunted, documents: Sequence[dict[str, Any]], again: str) -
 
 
 def law_text(hunted: Hunted) -> str:
-    """The law that explains an error of this integrator."""
+    """The law of the errors of this integrator."""
     return (
         f"{hunted.law:.2g} eps times the motion's own amplification times the root of its radians, "
         "the law of nine tenths of the random tops"
@@ -34,36 +34,36 @@ def law_text(hunted: Hunted) -> str:
 
 
 def worst_lines(hunted: Hunted) -> list[str]:
-    """A line each of the worst motions whose error is explained."""
-    eps = float(hunted.asked.precision.eps)
+    """A line for each of the worst motions whose error is explained."""
+    eps = float(hunted.request.precision.eps)
     lines = []
     for m in hunted.worst:
         part = m.error / max(hunted.law * m.explained(eps), 1e-300)
-        about = "; ".join([class_of(*m.motion), *special(m)])
+        features = "; ".join([class_of(*m.motion), *special(m)])
         lines.append(
-            f"{_right(m.error, eps)} digits right, {m.error / hunted.asked.unit:.2g} eps T^1.5, "
-            f"{part:.2g} of what is explained: {about}."
+            f"{_right(m.error, eps)} digits right, {m.error / hunted.request.unit:.2g} eps T^1.5, "
+            f"{part:.2g} of what is explained: {features}."
         )
     return lines
 
 
 def _searched(hunted: Hunted) -> str:
-    a = hunted.asked
-    beyond = "" if not hunted.unknown else f" The true motion of {hunted.unknown} was out of reach."
-    lost = "" if not hunted.lost else f" On {hunted.lost} no integrator of this format keeps a digit."
-    return fill(
-        f"{a.integrator.name} in {a.precision.name} to T = {time_text(a.horizon)}: {hunted.motions} motions tried of "
-        f"{hunted.planned}.{beyond}{lost}",
-        _WIDTH,
-    )
+    request = hunted.request
+    text = f"{request.integrator.name} in {request.precision.name} to T = {time_text(request.horizon)}: "
+    text += f"{hunted.motions} motions tried of {hunted.planned}."
+    if hunted.unknown:
+        text += f" The true motion of {hunted.unknown} was out of reach."
+    if hunted.lost:
+        text += f" On {hunted.lost} no integrator of this format keeps a digit."
+    return fill(text, _WIDTH)
 
 
 def _nothing(hunted: Hunted) -> list[str]:
-    asked = hunted.asked
-    if asked.against is not None:
-        beyond = f"an error {asked.limit or DECADES:.3g} times that of {asked.against.name}"
-    elif asked.limit is not None:
-        beyond = f"an error of {asked.limit:.3g} eps T^1.5"
+    request = hunted.request
+    if request.against is not None:
+        beyond = f"an error {request.limit or DECADES:.3g} times that of {request.against.name}"
+    elif request.limit is not None:
+        beyond = f"an error of {request.limit:.3g} eps T^1.5"
     else:
         beyond = f"an error two decades beyond what explains it: {law_text(hunted)}"
     lines = [fill(f"Nothing was found: no run failed, and none has {beyond}.", _WIDTH)]
@@ -73,20 +73,20 @@ def _nothing(hunted: Hunted) -> list[str]:
 
 
 def _found(hunted: Hunted, number: int, document: dict[str, Any], m: MeasuredMotion, p: Proof) -> list[str]:
-    eps = float(hunted.asked.precision.eps)
+    eps = float(hunted.request.precision.eps)
     if math.isinf(m.error):
-        head = f"{number}. The run ends as {m.outcome}" + (f": {m.said}" if m.said else "")
+        head = f"{number}. The run ends as {m.outcome}" + (f": {m.reason}" if m.reason else "")
         proof = f"The true motion exists there, {p.against}."
     else:
         head = f"{number}. {_right(p.error, eps)} digits right: an error of {p.error:.3g}"
         word = "Proven" if p.proven else "Not proven"
         proof = f"{word}: compared with {p.against.removeprefix('known: ')}."
     usual = f"Random tops: {_right(hunted.median, eps)} digits right (median)."
-    beside = f"{_beside(hunted.asked.other, p, eps)}"
-    what = "; ".join([document["class"], *special(m)])
+    other = _other_error(hunted.request.other, p, eps)
+    features = "; ".join([document["class"], *special(m)])
     return [
         fill(f"{head}.", _WIDTH),
-        *_folded([f"{usual} {beside}", f"What is special: {what}.", proof]),
+        *_folded([f"{usual} {other}", f"What is special: {features}.", proof]),
         "",
         document["toml"],
         "",
@@ -96,11 +96,11 @@ def _found(hunted: Hunted, number: int, document: dict[str, Any], m: MeasuredMot
 
 
 def _right(error: float, eps: float) -> str:
-    """Digits right, at most those of the format."""
+    """Correct digits, at most those of the format."""
     return f"{-math.log10(eps) - digits_lost(error, eps):z.1f}"
 
 
-def _beside(other: Integrator, p: Proof, eps: float) -> str:
+def _other_error(other: Integrator, p: Proof, eps: float) -> str:
     if p.other is None:
         return f"How many digits of {other.name} are right here is not known."
     if math.isinf(p.other):

@@ -1,4 +1,4 @@
-"""The error between samples: slerp, linear, Hermite and Lagrange interpolation of a motion sampled at equal steps."""
+"""The error of slerp, linear, Hermite and Lagrange interpolation between samples of a motion at equal steps."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class BetweenSamples(Tabular):
     """The largest error of each of :data:`METHODS` between samples.
 
     spacing: Δt, of which the last time is a multiple.  errors: by method; None where there are too few samples.
-    within: the error wanted.  largest: by method the largest Δt, a part of the last time, that keeps to it; None where
+    within: the target error.  largest: by method the largest Δt, a divisor of the last time, that meets it; None where
     20,000 intervals do not.
     """
 
@@ -58,11 +58,11 @@ class BetweenSamples(Tabular):
             return cells if self.within is None else (*cells, "none" if best is None else decimal_text(best, 6))
 
         head = ("method", "largest error")
-        wanted = () if self.within is None else (f"largest Δt for {self.within:.1e}",)
+        spacings = () if self.within is None else (f"largest Δt for {self.within:.1e}",)
         title = f"Between samples {decimal_text(self.spacing, 6)} apart"
         if self.asked != self.spacing:
             title += f" ({decimal_text(self.asked, 6)}, reduced to a divisor of the last time)"
-        return TitledTable(title, (*head, *wanted), [row(name) for name in METHODS])
+        return TitledTable(title, (*head, *spacings), [row(name) for name in METHODS])
 
 
 def between_samples(
@@ -79,7 +79,7 @@ def between_samples(
     Arguments:
         top, start, system: as in :func:`heavytop.propagate`.
         until, spacing: exact, positive; of samples, ``spacing`` being reduced to a divisor of ``until``.
-        within: the error wanted, above 1e-12.
+        within: the target error, above 1e-12.
 
     Returns:
         A ``BetweenSamples``: ``errors`` and ``largest`` by "slerp" (of the attitude, radians), "linear", "hermite"
@@ -90,23 +90,23 @@ def between_samples(
     """
     body, state = arguments.motion(top, start)
     about, end, step = arguments.system(system, body), physical(until, "until"), physical(spacing, "between")
-    wanted = None if within is None else float(physical(within, "within"))
+    target = None if within is None else float(physical(within, "within"))
     if not 0 < step <= end:
         raise InputError(f"spacing must be above 0 and at most until; got {spacing}.", "Give, for example, until/100.")
-    if wanted is not None and not 1e-12 < wanted < 1:
+    if target is not None and not 1e-12 < target < 1:
         raise InputError(f"within must be between 1e-12 and 1; got {within}.", "Give, for example, 1e-6.")
     count = int(-(-end // step))
     if count > _MOST:
         raise InputError(f"{count} intervals are more than {_MOST}.", "Give a larger spacing, or an earlier time.")
     errors = cache(partial(_errors, body, state, about, end))
-    largest = {} if wanted is None else {name: _largest(errors, name, wanted, end, count) for name in METHODS}
-    return BetweenSamples(end, end / count, errors(count), wanted, largest, step)
+    largest = {} if target is None else {name: _largest(errors, name, target, end, count) for name in METHODS}
+    return BetweenSamples(end, end / count, errors(count), target, largest, step)
 
 
 def _errors(
     body: HeavyTop | Body, start: State, system: System, until: Fraction, count: int
 ) -> dict[str, float | None]:
-    """By method, of ``count`` intervals of a motion in principal axes, sampled in double."""
+    """The errors by method over ``count`` intervals of a motion in principal axes, sampled in double."""
     setup = Setup.of(body, start, arguments.precision("double"), system)
     run = propagator("heyoka", {"xi": setup.xi})
     times = check_times(numpy.arange(count * _PARTS + 1) * float(until / (count * _PARTS)))
@@ -118,7 +118,10 @@ def _errors(
 
 
 def _compared(y: Array, q: Array, slopes: Array) -> dict[str, float | None]:
-    """y, q: at every eighth of an interval, shape (6 or 4, 8 n + 1).  slopes: y' Δt at the samples."""
+    """The largest errors by method.
+
+    y, q: states and quaternions at each eighth of an interval, shape (6 or 4, 8 n + 1).  slopes: y' Δt at the samples.
+    """
     nodes, turns = y[:, ::_PARTS], q[:, ::_PARTS]
     a, b, da, db = nodes[:, :-1], nodes[:, 1:], slopes[:, :-1], slopes[:, 1:]
     largest: dict[str, float | None] = dict.fromkeys(METHODS, 0.0)
@@ -160,14 +163,14 @@ def _angles(a: Array, b: Array) -> Array:
     return angles
 
 
-def _largest(errors: Any, name: str, wanted: float, end: Fraction, count: int) -> Fraction | None:
-    """The fewest intervals that keep to the error, beside where the order of the method has them from ``count``."""
+def _largest(errors: Any, name: str, target: float, end: Fraction, count: int) -> Fraction | None:
+    """The largest spacing that meets the error, by a search around the prediction of the method's order."""
 
     def within(count: int) -> bool:
         error = errors(count)[name]
-        return error is not None and error <= wanted
+        return error is not None and error <= target
 
-    high = low = min(_MOST, max(4, math.ceil(count * ((errors(count)[name] or 1) / wanted) ** (1 / _ORDERS[name]))))
+    high = low = min(_MOST, max(4, math.ceil(count * ((errors(count)[name] or 1) / target) ** (1 / _ORDERS[name]))))
     while not within(high):
         if high == _MOST:
             return None

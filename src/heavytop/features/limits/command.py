@@ -11,7 +11,7 @@ from heavytop.cli.output import counted
 from heavytop.errors import ExitCode, InputError
 
 _SECONDS = 1.0
-"""Expected of a test with its faults."""
+"""Expected duration of a test with its faults."""
 
 
 @command

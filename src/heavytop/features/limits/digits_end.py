@@ -1,8 +1,8 @@
-"""When digits end: a state that is rounded once and followed exactly, wherever that costs most.
+"""The loss of digits through one rounding of the state to a format, at the time where that costs most.
 
-On a grid of times the motion is computed with twice the bits of a format, rounded to the format at each of some of
-them, and followed from there.  The time at which the worst of these has lost its first digit, and that at which it has
-lost all of them, are proven: two known motions, enclosed, lie so far apart.
+The motion is computed on a grid of times with twice the bits of a format.  At some of these times the state is rounded
+to the format, and the motion continued from there without rounding errors.  The times at which the worst of these
+motions has lost its first digit and all digits are proven: enclosures of both motions lie so far apart.
 """
 
 from __future__ import annotations
@@ -30,16 +30,17 @@ from heavytop.top.equations import GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 _TIMES, _EACH = 64, 4
-"""Times looked at, and every how many of them the state is rounded."""
+"""The number of times; the state is rounded at every fourth."""
 _SPARE_BITS = 32
 _ALL = 0.5
-"""A relative error from which no digit is right."""
+"""The relative error from which on no digit is correct."""
 
 
 @dataclass(frozen=True, slots=True)
 class Loss:
-    """time: at which the digits are lost.  rounded_at: when the state was rounded.  digits: that are right at the time.
+    """A loss of digits.
 
+    time: at which the digits are lost.  rounded_at: when the state was rounded.  digits: that are correct at the time.
     proven: whether enclosures of both motions show it; else they do not reach so far.
     """
 
@@ -58,8 +59,8 @@ class Loss:
 class DigitsEnd(Tabular):
     """The digits that a single rounding of the state leaves.
 
-    precision: to which it is rounded.  of_digits: decimal digits of that.  times, digits: what is left until each time.
-    first, last: where the first digit is lost, and where all are; None where that is not before the last time.
+    precision: to which it is rounded.  of_digits: decimal digits of that.  digits: left until each of the times.
+    first, last: the loss of the first digit and of all digits; None where it is not before the last time.
     """
 
     precision: str
@@ -77,7 +78,7 @@ class DigitsEnd(Tabular):
         return {"precision": self.precision, "of_digits": round(self.of_digits, 2)} | ends
 
     def sentences(self) -> list[str]:
-        """Sentences on the times at which the first and the last digit end."""
+        """Sentences on the loss of the first digit and of all digits."""
         lines = []
         for what, loss in (("the first digit", self.first), ("all digits", self.last)):
             if loss is None:
@@ -108,11 +109,11 @@ def digits_end(
     *,
     system: System | str | None = None,
 ) -> DigitsEnd:
-    """When the first digit of a state in a format, and when every digit, is lost to a single rounding on the way.
+    """The times at which one rounding of the state costs the first digit of a format, and all digits.
 
     Arguments:
         top, start, precision, system: as in :func:`heavytop.propagate`.
-        until: an exact time, not 0; 64 times up to it are looked at.
+        until: an exact time, not 0; digits are counted at 64 times up to it.
 
     Returns:
         A ``DigitsEnd``: ``first`` and ``last`` with ``time``, ``rounded_at`` and ``proven``; ``digits`` (64,).
@@ -146,10 +147,10 @@ def _digits(error: float, most: float = math.inf) -> float:
 
 
 def _errors(problem: Problem, times: Sequence[Fraction]) -> dict[int, dict[int, float]]:
-    """By the place of the rounding and the place of the time: the largest relative error of a component.
+    """The largest relative error of a component, by the index of the rounding and the index of the time.
 
-    Beyond the time at which one rounding has lost all digits no other is followed.  What is rounded is 2^-p off at
-    once, so that half the bits of the true motion follow it as far.
+    No motion is computed beyond the time at which one rounding has lost all digits.  A rounding is an error of 2^-p,
+    so that the rounded motion needs half the spare bits of the true one.
     """
     run, bits = propagator("multiword", {}), problem.precision.bits
 
@@ -184,7 +185,7 @@ def _rounded(state: Sequence[Fraction], form: Precision) -> State:
 def _losses(
     problem: Problem, times: Sequence[Fraction], worst: Sequence[tuple[float, int]], levels: Sequence[float]
 ) -> list[Loss | None]:
-    """The first time of each level of error, proven where enclosures reach; None where it is not reached."""
+    """The first time at which each level of error is reached, proven as far as enclosures reach; None for never."""
     known, bits = find(problem.top, problem.start, problem.system), problem.precision.bits + _SPARE_BITS
 
     @cache

@@ -1,4 +1,4 @@
-"""The options of `propagate` and `reference` for digits that end, and for what lies between samples."""
+"""The options of `propagate` and `reference` for the loss of digits and for interpolation between samples."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class LimitOptions(NamedTuple):
         return "limits" if self.digits_end or self.between is not None else ""
 
     def measure(self, top: Any, start: Any, until: Any, **settings: Any) -> MotionLimits:
-        """Both, as far as they were asked for."""
+        """The measurements that the options request."""
         from heavytop.features.limits.between import between_samples
         from heavytop.features.limits.digits_end import digits_end
 

@@ -1,4 +1,4 @@
-"""The power of a test: which planted faults a comparison with the true motion detects, from when on.
+"""The power of a regression test: the planted faults that a comparison with the true motion detects, and when.
 
 A test compares Ω and the attitude of a run at equal steps with the true motion, each component relative above 1, and
 fails where one is off by more than its tolerance.  Every fault is computed in double, by heyoka.
@@ -33,8 +33,10 @@ _G = Fraction("9.8") / Fraction("9.81")
 
 @dataclass(frozen=True, slots=True)
 class PlantedFault:
-    """name.  errors: at each time, the largest of a component.  detected_from: the first time with more than the
-    tolerance; None where the test passes.  tolerance: the largest error, below which a tolerance must be.
+    """A planted fault and its detection.
+
+    errors: the largest of a component at each time.  detected_from: the first time at which they exceed the tolerance;
+    None where the test passes.  tolerance: the largest error, which a tolerance must stay below.
     """
 
     name: str
@@ -109,7 +111,7 @@ def power(
     control: Number | None = None,
     system: System | str | None = None,
 ) -> Power:
-    """From when on a regression test of a motion detects each planted fault, and the widest tolerance that does.
+    """The time from which a regression test of a motion detects each planted fault, and the widest tolerance for that.
 
     Arguments:
         top, start, system: as in :func:`heavytop.propagate`.
@@ -128,30 +130,29 @@ def power(
     motion = body, state, arguments.system(system, body)
     if motion[2] is GYROSTAT:
         raise InputError("power is not of the system gyrostat.", "Use heavy_gyrostat, with a rotor.")
-    end, most = physical(until, "until"), physical(tolerance, "tolerance")
-    apart = end / 100 if step is None else physical(step, "step")
-    if not (0 < apart <= end and most > 0):
-        asked = f"until = {until}, step = {apart}, tolerance = {tolerance}"
+    end, limit = physical(until, "until"), float(physical(tolerance, "tolerance"))
+    spacing = end / 100 if step is None else physical(step, "step")
+    if not (0 < spacing <= end and limit > 0):
+        values = f"until = {until}, step = {spacing}, tolerance = {tolerance}"
         raise InputError(
-            f"{asked}: these must be positive, and step at most until.", "Give, for example, 10, 0.1, 1e-6."
+            f"{values}: these must be positive, and step at most until.", "Give, for example, 10, 0.1, 1e-6."
         )
-    count = int(end // apart)
+    count = int(end // spacing)
     if count > _MOST:
         raise InputError(f"{count} samples are more than {_MOST}.", "Give a larger step, or an earlier end.")
-    times = [apart * k for k in range(1, count + 1)]
-    true, limit = _rows(motion, times), float(most)
-    method = named(integrator)
+    times = [spacing * k for k in range(1, count + 1)]
+    true, method = _rows(motion, times), named(integrator)
     options = {} if control is None else {control_name(method) or "tolerance": physical(control, "control")}
-    error = float(_off(_states(motion, times, DOUBLE, method, options), _states(motion, times, QUAD)).max())
+    error = float(_errors(_states(motion, times, DOUBLE, method, options), _states(motion, times, QUAD)).max())
     faults, left_out = [], {}
     for name in _names(planted):
         rows = FAULTS[name](motion, times)
         if isinstance(rows, str):
             left_out[name] = rows
             continue
-        errors = _off(rows, true).max(axis=1)
-        first = int(numpy.argmax(errors > limit)) if (errors > limit).any() else None
-        faults.append(PlantedFault(name, errors, None if first is None else times[first], float(errors.max())))
+        errors = _errors(rows, true).max(axis=1)
+        detected_from = next((time for time, error in zip(times, errors, strict=True) if error > limit), None)
+        faults.append(PlantedFault(name, errors, detected_from, float(errors.max())))
     return Power(tuple(times), limit, error, tuple(faults), left_out)
 
 
@@ -166,7 +167,7 @@ def _names(planted: str | Sequence[str]) -> list[str]:
     return list(names)
 
 
-def _off(rows: Array, true: Array) -> Array:
+def _errors(rows: Array, true: Array) -> Array:
     errors: Array = abs(rows - true) / numpy.maximum(1, abs(true))
     return numpy.where(numpy.isfinite(errors), errors, numpy.inf)
 
@@ -174,7 +175,7 @@ def _off(rows: Array, true: Array) -> Array:
 def _states(
     motion: Motion, times: Sequence[Fraction], form: Precision, which: Any = "multiword", options: Any = None
 ) -> Array:
-    """(Ω, γ), shape (n, 6), in the axes given; infinite from where the run ended on."""
+    """(Ω, γ), shape (n, 6), in the given axes; infinite after the end of an aborted run."""
     body, start, system = motion
     setup = Setup.of(body, start, form, system)
     run = setup.given(propagator(which, options or {})(setup.top, setup.start, times, form, system=system))
@@ -184,7 +185,7 @@ def _states(
 
 
 def _rows(motion: Motion, times: Sequence[Fraction], form: Precision = DOUBLE, field: System | None = None) -> Array:
-    """Ω and R row by row, shape (n, 12), in the axes given; by the motion's equations where ``field`` is None."""
+    """Ω and R row by row, shape (n, 12), in the given axes; field: of other equations of motion."""
     body, start, system = motion
     setup = Setup.of(body, start, form, system)
     top = setup.top if field is None else replace(setup.top, rotor=None)
@@ -209,7 +210,7 @@ def _transposed(motion: Motion, times: Sequence[Fraction]) -> Array:
 
 
 def _steiner(motion: Motion, times: Sequence[Fraction], changed: Any) -> Array | str:
-    """The Steiner term forgotten, or added twice."""
+    """The motion with the Steiner term forgotten, or added twice."""
     body = motion[0]
     if not isinstance(body, Body) or not any(body.centre):
         return "no mass off the pivot is given"
@@ -259,4 +260,4 @@ FAULTS: dict[str, Callable[[Motion, Sequence[Fraction]], Array | str]] = {
     "tensor_order": _order,
     "gravity_9.8": _gravity,
 }
-"""transposed: Rᵀ written for R.  late: by half a step.  gravity_9.8: in place of 9.81."""
+"""transposed: Rᵀ in place of R.  late: by half a step.  gravity_9.8: in place of 9.81."""
