@@ -372,6 +372,25 @@ def test_units_of_any_size_do_not_matter(power: int) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("time", "inertia"), [(-30, 30), (30, -30), (0, 30)])
+def test_an_order_of_columns_and_the_momentum_of_a_start_are_named_in_any_units(time: int, inertia: int) -> None:
+    top, start, times = problem(11)
+    unit, size = Fraction(10) ** time, Fraction(10) ** inertia
+    slow = State([w / unit for w in start.omega], start.gamma)
+    heavy = HeavyTop([i * size for i in top.inertia], top.weight * size / unit**2, top.centre)
+    late = [t * unit for t in times]
+    y = runge_kutta(top, start, times) * ([float(1 / unit)] * 3 + [1] * 3)
+    (told,) = found(heavy, slow, late, y[:, [0, 3, 1, 4, 2, 5]])
+    assert (told.kind, told.numbers["columns"]) == ("column_order", "Ω1, γ1, Ω2, γ2, Ω3, γ3")
+    momentum = State([w * i for w, i in zip(slow.omega, heavy.inertia, strict=True)], slow.gamma)
+    (told,) = found(heavy, momentum, late, y)
+    assert (told.kind, told.numbers) == ("start_momentum", {})
+    momenta = np.hstack([y[:, :3] * [float(i) for i in heavy.inertia], y[:, 3:]])
+    (told,) = found(heavy, momentum, late, momenta)
+    assert (told.kind, told.numbers) == ("all_momentum", {})
+
+
+@pytest.mark.slow
 def test_times_and_numbers_that_no_double_holds_are_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("heavytop.features.score.diagnose.samples._STEPS", 1000)  # a hundred times on the way to 1e300
     top, start, times = problem(11)

@@ -13,7 +13,9 @@ import pytest
 
 from heavytop.cases import CASES
 from heavytop.errors import InputError
-from heavytop.features.score.measurement import measured
+from heavytop.features.score import measurement
+from heavytop.features.score.diagnose import samples
+from heavytop.features.score.measurement import assess, measured
 from heavytop.features.score.trajectories.files import read
 from heavytop.measure.motion import compute
 from heavytop.measure.scalar import digits_kept
@@ -59,6 +61,22 @@ def test_our_own_motion_scores_as_it_scored_itself(precision, tmp_path: Path) ->
     assert precision.eps / 100 < error < 100 * precision.eps
     assert "Lagrange" in row.against
     assert digits_kept(row) > 0.9 * precision.bits * 0.301 - 1
+
+
+@pytest.mark.slow
+def test_times_beyond_the_reach_of_heyoka_take_few_of_its_steps(monkeypatch, tmp_path: Path) -> None:
+    limits, motions = [], []
+    propagate, states_at = measurement.propagate, samples.states_at
+    watched = lambda *given, **options: limits.append(options["step_limit"]) or propagate(*given, **options)  # noqa: E731
+    monkeypatch.setattr(measurement, "propagate", watched)
+    monkeypatch.setattr(samples, "states_at", lambda *given: motions.append(1) or states_at(*given))
+    given = document()
+    given["times"] = [f"{time}e140" for time in ("1.3", "2", "7.1")]
+    given["states"] = [[row[i] for i in (0, 3, 1, 4, 2, 5)] for row in given["states"]]
+    scored = assess(read(written(tmp_path, given)))
+    assert (scored.digits_right, scored.peer, scored.diagnoses) == (0, None, [])
+    assert max(limits) < measurement._EFFORT / 1e-6 / 40
+    assert len(motions) < 20
 
 
 def test_a_known_mistake_is_measured(tmp_path: Path) -> None:

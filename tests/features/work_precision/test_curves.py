@@ -123,6 +123,26 @@ def test_constants_that_are_no_gain_or_alone_or_too_coarse_change_no_claim() -> 
     assert (coarse.name, coarse.ratio) == ("heyoka double", pytest.approx(4.5))
 
 
+@pytest.mark.parametrize(("theirs", "cell"), [(1.92, "1.0"), (1.88, "slower, 0.9"), (2.08, "1.0"), (2.12, "1.1")])
+def test_a_lead_is_called_slower_where_its_printed_digits_are(theirs: float, cell: str) -> None:
+    report = Report(SCHEMA, {"name": "p"}, {}, [*OURS, row("fast:x tolerance=1", -11, theirs)])
+    section = work_precision([("", report)])
+    assert section is not None
+    assert section.answers is not None
+    ((*_, times, _, _),) = section.answers.rows
+    assert times == f"{cell}\N{NO-BREAK SPACE}×"
+
+
+def test_no_two_of_many_curves_look_alike() -> None:
+    rows = [row(f"x{n} tolerance=1", -8 - n / 2, 0.1 + n) for n in range(17)]
+    with quiet_style():
+        section = work_precision([("", Report(SCHEMA, {"name": "p"}, {}, rows))])
+    assert section is not None
+    curves = [line for line in section.pictures[0].axes.get_lines() if str(line.get_label()).startswith("x")]
+    looks = {(line.get_color(), line.get_marker(), str(line._dash_pattern)) for line in curves}
+    assert len(looks) == len(curves) == 17
+
+
 def test_an_error_that_nobody_reaches_makes_no_lead() -> None:
     assert leads([OURS[0], CYRK[0]]) == []
 

@@ -183,6 +183,8 @@ _REFERENCE_EFFORT = 10.0
 """Seconds of the model of its cost that a computed reference may take."""
 _EFFORT = 20.0
 """Seconds that the run of heyoka beside the scored one may take, roughly."""
+_PROBE, _SLOWER = 50, 2
+"""heyoka is not run where the first 50th of its steps reaches less than a 100th of the time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -385,8 +387,14 @@ def _peer(trajectory: GivenTrajectory, measured: Scored, count: int, progress: P
 
     top, start = problem.given or (problem.top, problem.start)
     options: dict[str, Any] = {"system": problem.system, "xi": problem.xi, "step_limit": limit, "observer": observe}
+    times = trajectory.times[:count]
     try:
-        run = propagate(top, start, trajectory.times[:count], precision, **options)
+        if abs(times[-1]) * turning_rate(top, start) > limit:
+            few = options | {"observer": None, "step_limit": limit // _PROBE}
+            first = propagate(top, start, times[-1:], precision, **few)
+            if _PROBE * _SLOWER * abs(first.time_reached) < abs(times[-1]):
+                return None
+        run = propagate(top, start, times, precision, **options)
     except HeavyTopError:  # a format that this platform lacks, or numbers outside its range
         return None
     with working_precision(bits):

@@ -101,8 +101,9 @@ _MOST_COLOURS = 5
 
 
 def _in_colour(cases: Sequence[Sequence[WorkPrecisionLine]]) -> dict[str, int]:
-    """The place of each label: first the integrators of other packages and those that are fastest at error 1e-10, as
-    many as there are colours beside grey, in the order in which they come; then the others.
+    """The number of each label's look: first the integrators of other packages and those that are fastest at error
+    1e-10, as many as there are colours beside grey, in the order in which they come; then, in grey, the others, which
+    differ in marker and dashes.
     """
     points: Counter[str] = Counter()
     for lines in cases:
@@ -111,7 +112,8 @@ def _in_colour(cases: Sequence[Sequence[WorkPrecisionLine]]) -> dict[str, int]:
     labels = list(dict.fromkeys(line.label for lines in cases for line in lines))
     theirs = [line.label for lines in cases for line in lines if line.integrator not in INTEGRATORS]
     best = list(dict.fromkeys([*theirs, *(label for label, _ in points.most_common()), *labels]))[:_MOST_COLOURS]
-    return {label: index for index, label in enumerate(sorted(labels, key=lambda label: label not in best))}
+    grey = range(_MOST_COLOURS, len(COLOURS) * len(labels), len(COLOURS))
+    return dict(zip(sorted(labels, key=lambda label: label not in best), (*range(_MOST_COLOURS), *grey), strict=False))
 
 
 def _lead_cells(lead: Lead, source: str) -> list[str]:
@@ -125,7 +127,7 @@ def _lead_cells(lead: Lead, source: str) -> list[str]:
         said(lead.ours),
         clip(lead.other, 40),
         said(lead.theirs) if lead.other else "",
-        "" if lead.ratio is None else f"{'slower, ' * (lead.ratio < 1)}{lead.ratio:.1f}\N{NO-BREAK SPACE}×",
+        "" if lead.ratio is None else f"{'slower, ' * (round(lead.ratio, 1) < 1)}{lead.ratio:.1f}\N{NO-BREAK SPACE}×",
         "" if lead.general is None else said(lead.general[1]),
         "" if lead.lanes is None else seconds_text(lead.lanes),
     ]
@@ -140,8 +142,7 @@ def _picture(lines: Sequence[tuple[str, WorkPrecisionLine]], colours: dict[str, 
     decades(axes.yaxis)
     alternative, ends = [], []
     for (source, line), label, at_end in zip(lines, names, marked, strict=True):
-        colour = min(colours[line.label], _MOST_COLOURS)
-        key = numbered(label, colour, source == "baseline")
+        key = numbered(label, colours[line.label], source == "baseline")
         points = sorted((point.log10, math.log10(point.seconds)) for point in line.points)
         if points:
             draw(axes, key, [x for x, _ in points], [y for _, y in points], 4.2, every=None)

@@ -32,7 +32,7 @@ from heavytop.features.score.diagnose.readings import (
     simulate,
     turning,
 )
-from heavytop.features.score.diagnose.samples import looked_at, named, notable, principal, refused
+from heavytop.features.score.diagnose.samples import FARTHEST, looked_at, named, notable, principal, refused
 from heavytop.features.score.diagnose.search import (
     AS_LIKELY,
     DROP,
@@ -96,25 +96,29 @@ class Suppositions(Search):
     def __init__(self, seen: Seen, step: Fraction | None = None) -> None:
         self.step, self.start = step, seen.start.begin(seen.said, seen.body.tensor)
         rate = turning(seen.body, self.start)
-        self.every, self.seen = seen, seen.at(looked_at(list(map(float, seen.times)), rate))
+        times = list(map(float, seen.times))
+        rows = looked_at(times, rate)
+        within_reach = [row for row in rows if abs(times[row]) * rate <= FARTHEST]
+        self.reaches = bool(within_reach)
+        self.every, self.seen = seen, seen.at(within_reach or rows[:1])
         self.times, self.states = self.seen.times, len(seen.times)
         first = FIRST[-1] + (not self.times[0])
         self.early = self.seen.at(list(range(min(len(self.times), first))))
         self.own = self.errors_if(self.seen)
 
     def hypotheses(self) -> Iterator[Hypothesis]:
-        """The simplest first, those with a fitted number last."""
-        return map(self._tried, _suppositions(self))
+        """The simplest first, those with a fitted number last; none of a file whose samples are all out of reach."""
+        return map(self._tried, _suppositions(self) if self.reaches else ())
 
     def further(self, diagnosis: Diagnosis | None, own: float) -> Iterator[Hypothesis]:
         """Two readings at once."""
-        if diagnosis is None and own > _TWO_MISTAKES and _forms(self.seen) & set(FORMS):
+        if self.reaches and diagnosis is None and own > _TWO_MISTAKES and _forms(self.seen) & set(FORMS):
             yield from map(self._tried, _pairs(self.seen))
 
     def of_start(self) -> Diagnosis | None:
         """Another start: with its six numbers it also follows what is only early or late, and is tried last."""
         own = float(self.own.max())
-        if not WORTH_ASKING < own < numpy.inf or len(self.own) < _FEWEST:
+        if not self.reaches or not WORTH_ASKING < own < numpy.inf or len(self.own) < _FEWEST:
             return None
         return self.best([*map(self._tried, _start(self))], own)
 

@@ -178,7 +178,8 @@ def without_numbers(run: Examined) -> Iterator[Hypothesis]:
     """Mistakes of the data that need no fitted number, the likeliest first."""
     top, (omega, gamma) = run.top, (run.start.omega, run.start.gamma)
     k = top.rotor or (Fraction(0),) * 3
-    momentum = State([(w - r) / i for w, i, r in zip(omega, top.inertia, k, strict=True)], gamma)
+    inertia_unit = run.units.inertia
+    momentum = State([(w / inertia_unit - r) / i for w, i, r in zip(omega, top.inertia, k, strict=True)], gamma)
     for kind, other in (
         ("no_gravity", {"top": replace(top, weight=Fraction(0))}),
         ("weight_sign", {"top": replace(top, weight=-top.weight)}),
@@ -189,7 +190,9 @@ def without_numbers(run: Examined) -> Iterator[Hypothesis]:
         supposed = replace(run, **other)
         if (supposed.top.moment, supposed.start) != (top.moment, run.start):
             yield Hypothesis(kind, {}, supposed.beside())
-    yield Hypothesis("all_momentum", {}, _restated(run, momentum, lambda omega: omega @ run.tensor + run.in_file(k)))
+    if inertia_unit <= _LARGEST_UNIT:
+        momenta = _restated(run, momentum, lambda omega: float(inertia_unit) * (omega @ run.tensor + run.in_file(k)))
+        yield Hypothesis("all_momentum", {}, momenta)
     for unit, factor in UNITS_OF_OMEGA.items():
         yield Hypothesis(f"all_in_{unit}", {}, _all_times(run, factor))
     without = top if top.rotor is None else replace(top, rotor=None)
@@ -592,10 +595,12 @@ def _axes_of_space(run: Examined, truth: Array) -> Iterator[Hypothesis]:
 
 def _any_order(run: Examined, truth: Array) -> Iterator[Hypothesis]:
     """Each column as that component, or its negative, that it is nearest to."""
-    truth = truth[:, :6]
-    sizes = numpy.repeat([max(numpy.abs(truth[:, :3]).max(), 1e-3 * run.rate), numpy.abs(truth[:, 3:]).max()], 3)
+    unit = float(run.units.time)
+    of_file = numpy.repeat([unit, 1.0], 3)
+    truth, states = truth[:, :6] / of_file, run.states[:, :6] / of_file
+    sizes = numpy.repeat([max(numpy.abs(truth[:, :3]).max(), 1e-3 * run.rate / unit), numpy.abs(truth[:, 3:]).max()], 3)
     both = numpy.hstack([truth, -truth]) / numpy.tile(sizes, 2)
-    off = numpy.abs(run.states[:, :6, None] / numpy.tile(sizes, 2) - both[:, None, :])
+    off = numpy.abs(states[:, :, None] / numpy.tile(sizes, 2) - both[:, None, :])
     nearest = off.max(axis=0).argmin(axis=1)
     if sorted(nearest % 6) == list(range(6)):
         names = ", ".join(("−" if index >= 6 else "") + NAMES[index % 6] for index in nearest)

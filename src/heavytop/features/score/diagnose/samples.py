@@ -35,6 +35,8 @@ _FEW = 6
 _FEWEST = 3
 _STEPS = 50_000
 """Steps of heyoka in one supposed motion: they take a tenth of a second."""
+_LONGEST = 1e5
+"""Radians that a body may turn in so many steps, roughly."""
 FARTHEST = 3000.0
 """Radians that the body may turn until the last supposed time."""
 _OTHER_UNIT = Fraction(11, 10)
@@ -263,7 +265,11 @@ def examined(
     Those where roundings of the start hide the motion are left out if enough remain.  None for numbers that no double
     holds.  states: in the axes of ``frame``, principal ones without it; None for numbers that are not given.
     """
-    units = _units(top, start)
+    turning = start
+    if any(times) and abs(next(filter(None, times))) * turning_rate(top, start) > FARTHEST:
+        # no sample is within reach: the start may give the angular momentum
+        turning = State([w / i for w, i in zip(start.omega, top.inertia, strict=True)], start.gamma)
+    units = _units(top, turning)
     inertia, force = [i / units.inertia for i in top.inertia], units.inertia / units.time**2
     rotor = None if top.rotor is None else [k * units.time / units.inertia for k in top.rotor]
     top = HeavyTop(inertia, top.weight / force, top.centre, rotor)
@@ -272,7 +278,7 @@ def examined(
     scaled = [(*(None if w is None else w * units.time for w in state[:3]), *state[3:]) for state in states]
     try:
         array = numpy.array([[numpy.nan if value is None else float(value) for value in state] for state in scaled])
-        spin = numpy.linalg.norm(floats(start.omega))
+        spin = numpy.linalg.norm(floats([w * units.time for w in turning.omega]))
         ends = [float(time) for time in times]
         moment = [float(value) for value in top.moment]
     except OverflowError:
@@ -338,6 +344,8 @@ def motion(
 
 def motion_in_double(system: System, numbers: Array, first: Array, times: Array) -> Array | None:
     """:func:`motion` of the numbers that enter the field, of a start and of times in double."""
+    if numpy.abs(first[:3]).max() * numpy.abs(times).max(initial=0.0) > _LONGEST:
+        return None
     known, wanted = _states_by_time(system, numbers.tobytes(), first.tobytes()), times.tolist()
     for sign in (1.0, -1.0):
         targets = sorted({time for time in wanted if sign * time > 0 and time not in known}, key=abs)
