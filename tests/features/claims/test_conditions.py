@@ -258,7 +258,7 @@ UPRIGHT = SPIN | {"kind": "motion", "motion": {"gamma": ["0", "0", "1"]}}
 @pytest.fixture
 def unhurried(monkeypatch):
     """As many seconds for assumptions that would decide as a busy machine takes."""
-    monkeypatch.setattr("heavytop.features.claims.audit.audit._SEARCH", 600.0)
+    monkeypatch.setattr("heavytop.features.claims.audit.user_claims._SEARCH", 600.0)
 
 
 def _verdict(table: dict, assume: list[str]) -> tuple[str, dict[str, str]]:

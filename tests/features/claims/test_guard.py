@@ -15,6 +15,7 @@ from importlib.resources import files
 import pytest
 
 from heavytop.errors import HeavyTopError, InputError
+from heavytop.features.claims.audit import audit as auditing
 from heavytop.features.claims.audit import guard
 from heavytop.features.claims.audit.audit import audit
 
@@ -65,9 +66,15 @@ def test_who_uses_the_processor_is_stopped_long_before_the_limit_of_the_clock(mo
         guard.in_time(EXAMPLE, "heavy_top", seconds=0.1)
 
 
-def test_a_process_without_memory_says_so(monkeypatch):
-    monkeypatch.setattr(guard, "_CHILD", "print('{\"memory\": true}')")
-    with pytest.raises(InputError, match="more than 3 GB"):
+@pytest.mark.parametrize(("error", "cause"), [(MemoryError, "more than 3 GB"), (RecursionError, "nested too deeply")])
+def test_a_process_without_memory_or_stack_says_so(monkeypatch, error, cause):
+    def find(path: str) -> None:
+        raise error
+
+    monkeypatch.setattr(auditing, "find_claim", find)
+    answer = auditing.answer(EXAMPLE, "")
+    monkeypatch.setattr(guard, "_CHILD", f"print({json.dumps(answer)!r})")
+    with pytest.raises(InputError, match=f"{EXAMPLE}: .*{cause}"):
         guard.in_time(EXAMPLE, "heavy_top")
 
 
@@ -129,12 +136,6 @@ def test_flint_without_memory_says_so(monkeypatch):
     code = "import os, sys; sys.stderr.write('Exception (FLINT). Unable to allocate memory.\\n'); os.abort()"
     monkeypatch.setattr(guard, "_CHILD", code)
     with pytest.raises(InputError, match="more than 3 GB"):
-        guard.in_time(EXAMPLE, "heavy_top")
-
-
-def test_nested_beyond_the_stack_says_so(monkeypatch):
-    monkeypatch.setattr(guard, "_CHILD", "print('{\"depth\": true}')")
-    with pytest.raises(InputError, match="nested too deeply"):
         guard.in_time(EXAMPLE, "heavy_top")
 
 

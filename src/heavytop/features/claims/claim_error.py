@@ -1,5 +1,6 @@
-"""The error of a claim in its parts, never mixed: the formula compared with the truth, and the formula compared with
-itself in floating point.  (The third, an integrator compared with the exact claim, is measured by SolutionError.)
+"""The error of a claim in its parts: of the formula, against the true motion, and of its evaluation in floating point.
+
+The third part, the error of an integrator against the exact claim, is measured by SolutionError.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, lru_cache
+from typing import NamedTuple
 
 import numpy
 from flint import arb
@@ -25,16 +27,15 @@ from heavytop.top.attitude import Library, attitude_from_angles, euler_angles, r
 
 MODEL_BITS = 160
 
-Truth = Callable[[Fraction], tuple[list[arb], list[arb]]]
-"""time -> (six balls of the state, three of the attitude vector ξ)."""
+Truth = Callable[[Fraction], Sequence[arb]]
+"""The true Ω, γ and attitude vector ξ at a time: nine balls."""
 
 
-@dataclass(frozen=True, slots=True)
-class ModelError:
-    """How far a claim is from the true motion at one time.
+class ModelError(NamedTuple):
+    """The error of a claim against the true motion at one time.
 
     omega, gamma: largest component.  phi, theta, psi: modulo a turn, in [−π, π].  attitude: angle of the rotation
-    between the two attitudes, which also makes sense at the poles.  All angles in radians.
+    between the two attitudes, which is defined at the poles too.  All angles in radians.
     """
 
     omega: arb
@@ -75,30 +76,31 @@ def claim_attitude(case: PartialCase, time: Fraction, branch: Branch) -> Sequenc
 
 def model_error(case: PartialCase, time: Fraction, truth: Truth, branch: Branch = "smooth") -> ModelError:
     """The claim, exactly evaluated, against the true heavy-top motion from its own data at t = 0."""
-    return _difference(exact_claim(case, time, branch), claim_attitude(case, time, branch), *truth(time))
+    return _difference(exact_claim(case, time, branch), claim_attitude(case, time, branch), truth(time))
 
 
 @whole_evaluation
-def _difference(claim: Values[arb], claimed_xi: Sequence[arb], state: Sequence[arb], xi: Sequence[arb]) -> ModelError:
+def _difference(claim: Values[arb], claimed_xi: Sequence[arb], truth: Sequence[arb]) -> ModelError:
     with working_precision(MODEL_BITS + 32):
-        gamma = tuple(state[3:6])
+        omega, gamma, xi = truth[:3], tuple(truth[3:6]), tuple(truth[6:])
         claimed = euler_angles(claim.gamma, claimed_xi, FUNCTIONS)
-        true = euler_angles(gamma, tuple(xi), FUNCTIONS)
+        true = euler_angles(gamma, xi, FUNCTIONS)
         phi, theta, psi = (arb.atan2((a - b).sin(), (a - b).cos()) for a, b in zip(claimed, true, strict=True))
         return ModelError(
-            largest(a - b for a, b in zip(claim.omega, state[:3], strict=True)),
+            largest(a - b for a, b in zip(claim.omega, omega, strict=True)),
             largest(a - b for a, b in zip(claim.gamma, gamma, strict=True)),
             phi,
             theta,
             psi,
-            rotation_angle((claim.gamma, claimed_xi), (gamma, tuple(xi)), FUNCTIONS),
+            rotation_angle((claim.gamma, claimed_xi), (gamma, xi), FUNCTIONS),
         )
 
 
-@dataclass(frozen=True, slots=True)
-class EvaluationError:
-    """Absolute error of a formula evaluated in a format: a ball for each quantity, NaN where the format's value is not
-    finite.  omega: largest component.  Angles in radians."""
+class EvaluationError(NamedTuple):
+    """The absolute error of a formula evaluated in a format: balls, NaN where the format's value is not finite.
+
+    omega: largest component.  Angles in radians.
+    """
 
     omega: arb
     phi: arb
@@ -108,26 +110,26 @@ class EvaluationError:
 
 @whole_evaluation
 def evaluation_error(case: PartialCase, time: Fraction, precision: Precision, form: str) -> EvaluationError:
-    """The formulas evaluated in ``precision`` against themselves evaluated exactly, from the same rounded data.
+    """The formulas evaluated in ``precision`` against their exact evaluation with the same rounded data.
 
     form: ``printed`` for (4.2)-(4.6) to the letter, with the positive roots also for t > 0; ``stable`` for the
     hyperbolic forms.
     """
-    parameters = [number(value, precision) for value in (case.i1, case.i3, case.c1, time)]
-    i1, i3, c1, t = (exact(value) for value in parameters)
-    alpha = number(case.alpha, precision)
+    data = [number(value, precision) for value in (case.i1, case.i3, case.c1, time, case.alpha)]
+    i1, i3, c1, t, alpha = data
     with numpy.errstate(all="ignore"):
         if form == "printed":
-            computed = partial_case(parameters[0], parameters[1], parameters[2], parameters[3], numpy, "printed")
+            computed = partial_case(i1, i3, c1, t, numpy, "printed")
         else:
-            computed = stable_case(alpha, parameters[0], parameters[1], parameters[3], numpy)
+            computed = stable_case(alpha, i1, i3, t, numpy)
     bits = precision.bits + 64
 
     def evaluate(_working: int) -> list[arb]:
+        i1, i3, c1, t, alpha = (ball(exact(value)) for value in data)
         if form == "printed":
-            v = partial_case(ball(i1), ball(i3), ball(c1), ball(t), FUNCTIONS, "printed" if t else "smooth")
+            v = partial_case(i1, i3, c1, t, FUNCTIONS, "printed" if t else "smooth")
         else:
-            v = stable_case(ball(exact(alpha)), ball(i1), ball(i3), ball(t), FUNCTIONS)
+            v = stable_case(alpha, i1, i3, t, FUNCTIONS)
         return [*v.omega, v.theta, v.psi, *([v.phi] if t or form == "stable" else [])]
 
     o1, o2, o3, theta, psi, *phi = to_bits(evaluate, bits)
@@ -141,7 +143,7 @@ def evaluation_error(case: PartialCase, time: Fraction, precision: Precision, fo
 
 
 def stable_case(alpha: Real, i1: Real, i3: Real, t: Real, lib: Library) -> Values[Real]:
-    """The motion in the forms that lose no digits, over any ring; smooth branch."""
+    """The motion in forms without cancellation, over any ring; smooth branch."""
     s = alpha * ((i1 - i3) / i3) * t / 2
     omega, gamma = hyperbolic(alpha, i1 / i3, lib.tanh(s), 1 / lib.cosh(s))
     phi, theta = hyperbolic_angles(s, lib)
@@ -149,7 +151,7 @@ def stable_case(alpha: Real, i1: Real, i3: Real, t: Real, lib: Library) -> Value
 
 
 def first_failure(times: Sequence[Fraction], errors: Sequence[arb]) -> Fraction | None:
-    """The earliest |t| from which on no value is finite, None if the last one is."""
+    """The earliest |t| from which on no error is finite; None if the last one is."""
     failing: Fraction | None = None
     for time, error in zip(reversed(times), reversed(errors), strict=True):
         if error.is_finite():
@@ -158,27 +160,25 @@ def first_failure(times: Sequence[Fraction], errors: Sequence[arb]) -> Fraction 
     return failing
 
 
-# When a claim departs from the truth: the first time at which Ω of the two differ by 1 % of α.
+# The divergence time of a claim: the first time at which its Ω differs from that of the true motion by 1 % of α.
 #
-# The norm is that of every error of Ω in a report, the largest component of |ΔΩ|; the limit is α/100; the branch is
-# smooth or printed, as everywhere.  Both motions are known at any time, so the time is proven and no sample of a grid:
-# bounds of both motions over an interval show that ΔΩ cannot reach the limit there, and bisection closes in on the time
-# at which it has.
+# The norm is the largest component of |ΔΩ|, as in reports.  The time is proven: bounds of both motions over an interval
+# show that ΔΩ stays below the limit there, and bisection encloses the time at which it reaches the limit.
 
 
 PARTED = Fraction(1, 100)
-"""Claim and truth have parted when the largest component of |ΔΩ| reaches this, in units of α."""
+"""The limit of the largest component of |ΔΩ|, in units of α."""
 CLAIM_XI = (Fraction(0), Fraction(-1), Fraction(0))
 """ξ at t = 0 of the claimed attitude, where φ + ψ = π/2 and θ = 0."""
 CLOSE = Fraction(1, 10**8)
-"""Relative width of the interval that the time is proven to lie in."""
+"""Relative width of the proven interval of the time."""
 DIGITS = 6
 """Significant digits of the time in reports."""
 _BITS = 128
 _SHORTEST = Fraction(1, 2**80)
-"""Length of an interval, relative to the time: shorter ones tell nothing at this working precision."""
+"""The shortest interval, relative to the time, that this working precision resolves."""
 _EFFORT = 20.0
-"""Seconds that a validated truth may cost."""
+"""Seconds that the validated true motion may cost."""
 
 
 @lru_cache(maxsize=4)
@@ -204,11 +204,11 @@ class DivergenceTime:
 
 @whole_evaluation
 def divergence_time(case: PartialCase, horizon: Fraction, branch: Branch) -> DivergenceTime | None:
-    """When the claim parts from the truth on the way from 0 to ``horizon`` ≠ 0; None if it provably does not.
+    """The divergence time between 0 and ``horizon`` ≠ 0; None if |ΔΩ| provably stays below the limit.
 
     Raises OutOfReach where the true motion cannot be proven so far, or |ΔΩ| touches the limit without passing it.
     """
-    # in units of 1/α nothing but I1/I3 is left of the data
+    # in units of 1/α the motions depend on I1/I3 alone
     pair = _Pair(PartialCase(Fraction(1), case.i1 / case.i3, Fraction(1)), branch, backward=horizon < 0)
     end = abs(horizon) * case.alpha
     before, step = Fraction(0), end
@@ -230,7 +230,7 @@ def divergence_time(case: PartialCase, horizon: Fraction, branch: Branch) -> Div
 
 
 class _Pair:
-    """Claim and truth in one direction of time, both a motion of a system of their own."""
+    """The claim and the true motion in one direction of time, each a motion of its own system."""
 
     def __init__(self, case: PartialCase, branch: Branch, backward: bool) -> None:
         self.sign = -1 if backward else 1

@@ -7,7 +7,7 @@ import re
 import signal
 import sys
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
@@ -21,11 +21,11 @@ import msgspec
 from heavytop import files
 from heavytop.errors import HeavyTopError, InputError, invalid, meant, prefixed, quoted
 from heavytop.features.claims.audit.components import UserComponent
-from heavytop.features.claims.audit.context import ClaimFile, FileClaim
-from heavytop.features.claims.audit.guard import Answer, AuditEnded, in_time, limit_process
-from heavytop.features.claims.audit.judge import Audit, StatementVerdict, judge, verdict_of
+from heavytop.features.claims.audit.context import ClaimFile
+from heavytop.features.claims.audit.guard import Answer, AuditEnded, in_time, limit_process, no_memory, too_deep
+from heavytop.features.claims.audit.judge import Audit, Progress, silent
 from heavytop.features.claims.audit.stability import UserStability
-from heavytop.features.claims.audit.user_claims import UserIntegral, UserMotion
+from heavytop.features.claims.audit.user_claims import FileClaim, UserIntegral, UserMotion
 from heavytop.features.claims.audit.values import ValueClaim, ValueFile
 from heavytop.features.claims.library.entry import FOLDER, Entry, Verdict, file_of, library, split
 from heavytop.guard import processors
@@ -40,22 +40,21 @@ if TYPE_CHECKING:
 # nothing in a file is ever evaluated as code.
 
 
-Auditable: TypeAlias = "UserMotion | UserIntegral | PartialClaim | GeneralClaim"
-"""A claim whose formulas can be put into equations."""
-_TABLES: dict[str, tuple[str, Callable[[ClaimFile], Auditable]]] = {
+Claim: TypeAlias = "FileClaim | ValueClaim | PartialClaim | GeneralClaim"
+_TABLES: dict[str, tuple[str, Callable[[ClaimFile], FileClaim]]] = {
     "motion": ("motion", UserMotion),
     "component": ("component", UserComponent),
     "integral": ("integral", UserIntegral),
     "relation": ("integral", UserIntegral),
     "stability": ("motion", UserStability),
 }
-"""The table that each kind of claim needs, and what it is read as."""
+"""The table that each kind of claim needs, and its class."""
 _MAX_BYTES = 100_000
 _REMEDY = "`heavytop docs claims-in-toml` has the format, with examples."
 
 
-def read_claim(path: Path) -> Auditable | ValueClaim:
-    """The claim in a TOML file; raises InputError, with the reason, for anything that is not one."""
+def read_claim(path: Path) -> FileClaim | ValueClaim:
+    """The claim in a TOML file; raises InputError for a file that holds no valid claim."""
     try:
         with path.open("rb") as stream:
             raw = stream.read(_MAX_BYTES + 1)
@@ -73,65 +72,61 @@ def read_claim(path: Path) -> Auditable | ValueClaim:
     return claim_from_table(table, str(path))
 
 
-def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable | ValueClaim:
-    """The claim in a TOML table that has been read; raises InputError for anything that is not one."""
-    entry, rest = split(table, where)
-    if "entry" in rest:
+def claim_from_table(table: Mapping[str, Any], where: str) -> FileClaim | ValueClaim:
+    """The claim in a TOML table; raises InputError for a table that holds no valid claim."""
+    entry, claim = split(table, where)
+    if "entry" in claim:
         raise InputError(f"{where}: a claim has no key entry.", _REMEDY)
-    if rest.get("kind") == "value":
-        return _value_claim(rest, entry, where)
-    if "value" in rest:
-        raise InputError(f"{where}: kind = {quoted(rest.get('kind'))} with [[value]].", 'Use "value".')
+    if claim.get("kind") == "value":
+        return _value_claim(claim, entry, where)
+    if "value" in claim:
+        raise InputError(f"{where}: kind = {quoted(claim.get('kind'))} with [[value]].", 'Use "value".')
     try:
-        content = msgspec.convert(rest, ClaimFile)
+        content = msgspec.convert(claim, ClaimFile)
     except (msgspec.ValidationError, RecursionError) as error:
         raise InputError(f"{where}: {invalid(error, ClaimFile)}.", _REMEDY) from None
     if content.kind not in _TABLES:
         raise InputError(f"{where}: kind = {content.kind[:40]!r}.", f"Use {', '.join(_TABLES)} or value.")
-    wanted, made = _TABLES[content.kind]
-    if {name for name, _ in _TABLES.values() if getattr(content, name) is not None} != {wanted}:
-        raise InputError(f"{where}: kind {content.kind!r} needs the table [{wanted}], and no other claim.", _REMEDY)
+    needed, claim_class = _TABLES[content.kind]
+    if {name for name, _ in _TABLES.values() if getattr(content, name) is not None} != {needed}:
+        raise InputError(f"{where}: kind {content.kind!r} needs the table [{needed}], and no other claim.", _REMEDY)
     if (content.stable is None) is (content.kind == "stability"):
         raise InputError(f"{where}: stable must be true or false of kind 'stability', and of no other.", _REMEDY)
-    if content.quadrature is not None and wanted == "integral":
+    if content.quadrature is not None and needed == "integral":
         raise InputError(f"{where}: [quadrature] is about a motion, and kind = {content.kind!r}.", _REMEDY)
     if content.domain not in ("all", "t<=0", "t>0"):
         raise InputError(f"{where}: domain = {content.domain[:40]!r}.", 'Use "all", "t<=0" or "t>0".')
     content = msgspec.structs.replace(content, entry=entry)
     with prefixed(where):
-        return made(content)
+        return claim_class(content)
 
 
 def _value_claim(table: Mapping[str, Any], entry: Entry | None, where: str) -> ValueClaim:
-    def place(match: re.Match[str]) -> str:
-        """``value 3: `` of ``value[2].``: the numbers of a file are counted from 1."""
+    def counted_from_1(match: re.Match[str]) -> str:
+        """``value 3: `` for ``value[2].``."""
         return f"value {int(match[1]) + 1}" + (": " if match[2] else "")
 
     try:
         with prefixed(where):
             return ValueClaim(msgspec.convert(table, ValueFile), entry)
     except (msgspec.ValidationError, RecursionError) as error:
-        cause = re.sub(r"\bvalue\[(\d+)\](\.)?", place, invalid(error, ValueFile))
+        cause = re.sub(r"\bvalue\[(\d+)\](\.)?", counted_from_1, invalid(error, ValueFile))
         raise InputError(f"{where}: {cause}.", f"Numbers are text, as they are printed. {_REMEDY}") from None
 
 
 PAPER = ("ershkov-general", "ershkov-partial")
-_SEARCH, _MOST_ASSUMPTIONS = 6.0, 3
-"""Seconds for assumptions that would decide a claim, and how many of them are said."""
 
 
-def paper_claim(name: str) -> Auditable:
+def paper_claim(name: str) -> PartialClaim | GeneralClaim:
     """The paper's claim of that name, one of :data:`PAPER`."""
     from heavytop.features.claims.library.ershkov_audit import GeneralClaim, PartialClaim
 
     return GeneralClaim() if name == "ershkov-general" else PartialClaim()
 
 
-def find_claim(name: str) -> Auditable | ValueClaim:
+def find_claim(name: str) -> Claim:
     """The paper's claim of that name, or the claim in the TOML file at that path; raises InputError for neither."""
-    if name in PAPER:
-        return paper_claim(name)
-    return read_claim(_path(name))
+    return paper_claim(name) if name in PAPER else read_claim(_path(name))
 
 
 def _path(name: str) -> Path:
@@ -146,75 +141,21 @@ def _path(name: str) -> Path:
     return chosen
 
 
-def audit(
-    name: str, system_name: str | None = None, progress: Callable[[int, int], None] = lambda done, of: None
-) -> Audit:
+def audit(name: str, system_name: str | None = None, progress: Progress = silent) -> Audit:
     """The audit of a claim of the paper, or of a TOML file, as a motion of that system; None for the claim's own.
 
-    progress: hears of a claim of the paper how many equations are judged, of how many.
+    progress: of a claim of the paper.
     Raises InputError for an unknown claim or system and for a file that cannot be read.
     """
-    asked = None if system_name is None else system(system_name)
+    requested = None if system_name is None else system(system_name)
     if name in PAPER:
-        return audit_claim(paper_claim(name), asked, progress)
-    return in_time(str(_path(name)), "" if asked is None else asked.name)
+        return audit_claim(paper_claim(name), requested, progress)
+    return in_time(str(_path(name)), "" if requested is None else requested.name)
 
 
-def audit_claim(
-    claim: Auditable | ValueClaim,
-    asked: System | None = None,
-    progress: Callable[[int, int], None] = lambda done, of: None,
-) -> Audit:
-    """The audit of a claim that is at hand, as a motion of the system asked for.  progress: as in :func:`audit`."""
-    about, began = claim.about(asked), perf_counter()
-    if isinstance(claim, ValueClaim):
-        return Audit(
-            claim.content.name, about.name, claim.content.source, claim.rows(about), kind=claim.kind, entry=claim.entry
-        )
-    rows = _rows(claim, about, progress)
-    deciding = would_decide(claim, about, rows, perf_counter() - began)
-    why, solves = claim.explain(about, rows)
-    constants = tuple((name, str(value)) for name, value in claim.setting.constants)
-    heading = claim.name, about.name, claim.source
-    unused = claim.unused if isinstance(claim, FileClaim) else ()
-    table = claim.content.integral if isinstance(claim, UserIntegral) else None
-    where = tuple(table.where) if table else ()
-    return Audit(*heading, rows, tuple(why), solves, constants, claim.kind, claim.entry, deciding, unused, where)
-
-
-def _rows(
-    claim: Auditable, about: System, progress: Callable[[int, int], None] = lambda done, of: None
-) -> tuple[StatementVerdict, ...]:
-    if not isinstance(claim, UserComponent):
-        rows = judge(claim.statements(about), claim.setting, progress)
-        return (*rows, claim.judged(about, rows)) if isinstance(claim, UserStability) else rows
-    return tuple(row for statements, setting in claim.groups(about) for row in judge(statements, setting))
-
-
-def would_decide(
-    claim: Auditable, about: System, rows: Sequence[StatementVerdict], seconds: float
-) -> tuple[tuple[str, str], ...]:
-    """Assumptions on the parameters of an undecided claim in a file, each of which decides it, with the verdict then.
-
-    seconds: that the audit took; what would take more than :data:`_SEARCH` together is not tried.
-    """
-    if not isinstance(claim, FileClaim) or verdict_of(rows) != "undecided":
-        return ()
-    missing = [c.assumption for row in rows for c in row.conditions if c.assumption and not c.discharged]
-    deciding: list[tuple[str, str]] = []
-    began = perf_counter()
-    for bound in dict.fromkeys([*missing, *(f"{name} > 0" for name in claim.unassumed)]):
-        if perf_counter() - began + 2 * seconds > _SEARCH or len(deciding) == _MOST_ASSUMPTIONS:
-            break
-        if (bound.replace(">", "!="), "holds") in deciding:  # more than is needed
-            continue
-        try:
-            verdict = verdict_of(_rows(claim.assuming(bound), about))
-        except HeavyTopError:  # a sample breaks it, or the formula may not be assumed
-            continue
-        if verdict != "undecided":
-            deciding.append((bound, verdict))
-    return tuple(deciding)
+def audit_claim(claim: Claim, requested: System | None = None, progress: Progress = silent) -> Audit:
+    """The audit of a claim as a motion of the requested system; None for its own."""
+    return claim.audit(claim.about(requested), progress)
 
 
 def require_branch(branch: str) -> None:
@@ -326,9 +267,7 @@ def _program() -> bytes:
 
 
 def child() -> None:
-    """The audit of ``sys.argv[2:]`` = path, system, seconds of the processor and of the clock: a JSON document of
-    :class:`Answer` on standard output.
-    """
+    """Writes the :data:`Answer` for ``sys.argv[2:]`` = path, system, seconds of the processor and of the clock."""
     path, system_name, seconds, last = sys.argv[2:]
     if hasattr(signal, "alarm"):
         signal.alarm(int(last))
@@ -337,15 +276,15 @@ def child() -> None:
 
 
 def answer(path: str, system_name: str) -> Answer:
-    """The audit of a file, or why it cannot be audited."""
+    """The audit of a file, or the cause and remedy of the error."""
     try:
         claim = find_claim(path)
         with prefixed(path):
-            return Answer(report=audit_claim(claim, system(system_name) if system_name else None))
-    except HeavyTopError as error:
-        # a path may hold bytes that are no characters
-        return Answer(error=(error.cause.encode(errors="replace").decode(), error.remedy))
+            return audit_claim(claim, system(system_name) if system_name else None)
     except MemoryError:
-        return Answer(memory=True)
+        error: HeavyTopError = no_memory(path)
     except RecursionError:
-        return Answer(depth=True)
+        error = too_deep(path)
+    except HeavyTopError as raised:
+        error = raised
+    return error.cause.encode(errors="replace").decode(), error.remedy  # a path may hold bytes that are no characters

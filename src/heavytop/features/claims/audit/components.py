@@ -32,7 +32,7 @@ from heavytop.features.claims.audit.context import (
     setting_of,
     three,
 )
-from heavytop.features.claims.audit.judge import ExplanationStep, StatementVerdict, verdict_of
+from heavytop.features.claims.audit.judge import Progress, StatementVerdict, judge, silent, verdict_of
 from heavytop.features.claims.audit.user_claims import OFF_SPHERE, UserIntegral
 from heavytop.top.equations import HEAVY_GYROSTAT, System, area, area_with_rotor, energy
 
@@ -142,27 +142,22 @@ class UserComponent(UserIntegral):
 
     # --- on the state -------------------------------------------------------------------------------------------------
 
-    def groups(self, system: System) -> Iterator[tuple[list[Statement], Setting]]:
-        """Statements with what they are about: u alone, the state where u alone does not tell, and the time."""
+    def _groups(self, system: System) -> Iterator[tuple[list[Statement], Setting]]:
+        """Statements with their settings: in u, on the state where they are no functions of u, and in time."""
         in_u, on_state = self._reduced(system)
         base = setting_of(self.context, self._u)
         yield in_u, replace(base, samples=tuple(s for s in base.samples if self._moves(system, dict(s))))
         if on_state:
             yield on_state, self.at_states
-        yield self._in_time(system), self.setting
+        yield self._in_time(system), setting_of(self.context, TIME)
 
-    def explain(self, about: System, rows: Sequence[StatementVerdict]) -> tuple[list[ExplanationStep], tuple[str, ...]]:
-        """No steps; the system that it is about, where every row holds."""
-        return [], (about.name,) if verdict_of(rows) == "holds" else ()
+    def rows(self, about: System, progress: Progress = silent) -> tuple[StatementVerdict, ...]:
+        """The verdicts, group by group."""
+        return tuple(row for statements, setting in self._groups(about) for row in judge(statements, setting))
 
-    @property
-    def setting(self) -> Setting:
-        """The file's assumptions and samples of parameters."""
-        return setting_of(self.context, TIME)
-
-    def statements(self, system: System) -> list[Statement]:
-        """All of them."""
-        return [statement for statements, _ in self.groups(system) for statement in statements]
+    def solves(self, about: System, rows: Sequence[StatementVerdict]) -> tuple[str, ...]:
+        """The claim's own system, where every row holds."""
+        return (about.name,) if verdict_of(rows) == "holds" else ()
 
     def _moves(self, system: System, sample: Point) -> bool:
         """Whether u is not constant along the motion from the start."""

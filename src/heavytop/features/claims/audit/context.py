@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import combinations, pairwise
-from typing import Annotated, Self
+from typing import Annotated
 
 import msgspec
 import sympy
 from flint import arb
-from msgspec import structs
 
 from heavytop.errors import InputError, prefixed, quoted
 from heavytop.features.claims.algebra.conditions import (
@@ -45,7 +43,7 @@ from heavytop.features.claims.algebra.structure import rate_along, rationals
 from heavytop.features.claims.audit.statements import SYSTEMS
 from heavytop.features.claims.library.entry import Entry
 from heavytop.precision import exact
-from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System, system
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, Parameters, System, system
 
 # What a claim in TOML may hold: a motion, a first integral or an invariant relation, as it is written.
 
@@ -491,52 +489,6 @@ def of_file(asked: System | None, written: str | None, usual: System) -> System:
             f"The file is about {own.name}, but {asked.name} was asked for.", "Ask for that of the file, or none."
         )
     return asked or own or usual
-
-
-_NO_FORMULAS = ("name", "kind", "stable", "system", "source", "domain", "assume", "parameters", "definitions", "entry")
-
-
-class FileClaim:
-    """A claim of a file: its kind is motion, component, integral, relation or stability."""
-
-    def __init__(self, content: ClaimFile) -> None:
-        self.content = content
-        self.context = parse_context(content, self.variables)
-        self.name, self.source, self.kind, self.entry = content.name, content.source, content.kind, content.entry
-
-    @property
-    def variables(self) -> tuple[sympy.Symbol, ...]:
-        """Symbols that its formulas may hold beside its parameters."""
-        return ()
-
-    @property
-    def unassumed(self) -> list[str]:
-        """Parameters of whose sign no assumption says anything."""
-        words = set(re.findall(r"\w+", " ".join(text for text in self.content.assume if "!=" not in text)))
-        return [name for name in self.content.parameters if name not in words]
-
-    @property
-    def unused(self) -> tuple[str, ...]:
-        """Parameters that stand in no formula, nor in a definition that does."""
-        content = structs.asdict(self.content)
-        tables = {name: part for name, part in content.items() if name not in _NO_FORMULAS}
-        words = set(re.findall(r"\w+", str(msgspec.to_builtins(tables))))
-        for name, text in reversed(self.content.definitions.items()):
-            words |= set(re.findall(r"\w+", text)) if name in words else set()
-        return tuple(name for name in self.content.parameters if name not in words)
-
-    def assuming(self, bound: str) -> Self:
-        """The claim with one assumption more; raises InputError where a sample breaks it."""
-        return type(self)(structs.replace(self.content, assume=[*self.content.assume, bound]))
-
-    def about(self, asked: System | None) -> System:
-        """The system asked for, else the file's, else `heavy_gyrostat` where it gives k, else `heavy_top`.
-
-        Raises InputError where the file names another system, or gives another rotor than the system has.
-        """
-        claim = of_file(asked, self.content.system, HEAVY_TOP if self.context.carried is None else HEAVY_GYROSTAT)
-        self.context.parameters(claim)
-        return claim
 
 
 # The clock of a claimed motion: the time itself, or a quadrature t = F(u) + constant that is not inverted.

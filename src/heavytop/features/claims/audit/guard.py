@@ -1,7 +1,7 @@
-"""The audit of a file in a process of its own, with an end to its time and memory.
+"""The audit of a file in a process of its own, with limits of time and memory.
 
-The algebra of an honest claim takes seconds; that of a hostile or hopeless one can take forever, and cannot be
-interrupted from within.  The file is opened, read and parsed in that process too.
+The algebra of a usual claim takes seconds; that of a hostile or hopeless one may never end, and cannot be interrupted
+from within.  The file is opened, read and parsed in that process too.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import math
 import signal
 import subprocess
 import sys
+from typing import TypeAlias
 
 import msgspec
 
@@ -21,11 +22,11 @@ from heavytop.guard import how_it_ended
 SECONDS = 20
 """Seconds of processor time: a claim is not refused because others use the machine."""
 _WALL = 6
-"""Times as many by the clock, after which it is stopped whatever it does."""
+"""The limit by the clock is so many times as long."""
 _BYTES = 3 << 30
-# the process ends itself that much later, where nobody is left to stop it
+# seconds after which the process ends itself, where no caller is left to stop it
 _GRACE = 2
-# the program of the child: it imports nothing of the caller's script, so that this needs no main guard there
+# the child imports nothing of the caller's script, which needs no main guard
 _CHILD = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
     "from heavytop.features.claims.audit.audit import child; child()"
@@ -34,26 +35,21 @@ _NO_MEMORY = b"Unable to allocate memory"
 _TOO_LARGE = "Use fewer independent roots and exponentials, lower powers, or split the claim."
 
 
+Answer: TypeAlias = Audit | tuple[str, str]
+"""The answer of the child: a report, or the cause and remedy of an InputError."""
+
+
 class AuditEnded(HeavyTopError):
-    """The process of an audit ended without an answer: says how."""
+    """The end of an audit's process without an answer."""
 
     exit_code = ExitCode.INCOMPLETE
 
 
-class Answer(msgspec.Struct, frozen=True):
-    """The answer of the child: a report, or (cause, remedy) of an error, or that its memory or stack was used up."""
-
-    report: Audit | None = None
-    error: tuple[str, str] | None = None
-    memory: bool = False
-    depth: bool = False
-
-
 def in_time(path: str, system_name: str, seconds: float = SECONDS) -> Audit:
-    """The audit of the claim in a file, about its own system for the name "".
+    """The audit of the claim in a file; system_name: "" for the file's own.
 
-    Raises InputError where it takes more than ``seconds`` of processor time, 3 GB or the stack, and
-    AuditEnded with what happened where the process of the audit ends without an answer.
+    Raises InputError where it takes more than ``seconds`` of processor time, 3 GB or the stack, and AuditEnded where
+    the process of the audit ends without an answer.
     """
     slow = InputError(f"{path}: the audit took more than {seconds:g} s and was stopped.", _TOO_LARGE)
     wall = seconds * _WALL
@@ -70,26 +66,27 @@ def in_time(path: str, system_name: str, seconds: float = SECONDS) -> Audit:
     if done.returncode == -getattr(signal, "SIGXCPU", 0) < 0:
         raise slow
     try:
-        answer = msgspec.json.decode(done.stdout, type=Answer)
+        answer: Answer = msgspec.json.decode(done.stdout, type=Answer)
     except msgspec.DecodeError:
         if _NO_MEMORY in done.stdout + done.stderr:  # FLINT ends the process
-            raise _no_memory(path) from None
+            raise no_memory(path) from None
         raise AuditEnded(f"{path}: the process of the audit {_end_of(done)}.", "Try again.") from None
-    if answer.report is not None:
-        return answer.report
-    if answer.error is not None:
-        raise InputError(*answer.error)
-    if answer.depth:
-        raise InputError(f"{path}: the formulas are nested too deeply, and the audit was stopped.", _TOO_LARGE)
-    raise _no_memory(path)
+    if isinstance(answer, Audit):
+        return answer
+    raise InputError(*answer)
 
 
-def _no_memory(path: str) -> InputError:
+def no_memory(path: str) -> InputError:
+    """The error of an audit that takes too much memory."""
     return InputError(f"{path}: the audit took more than {_BYTES >> 30} GB and was stopped.", _TOO_LARGE)
 
 
+def too_deep(path: str) -> InputError:
+    """The error of an audit that exhausts the stack."""
+    return InputError(f"{path}: the formulas are nested too deeply, and the audit was stopped.", _TOO_LARGE)
+
+
 def _end_of(done: subprocess.CompletedProcess[bytes]) -> str:
-    """How a process that gave no answer ended."""
     if done.returncode < 0:
         return f"was killed {how_it_ended(done.returncode)}"
     last = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
@@ -97,7 +94,7 @@ def _end_of(done: subprocess.CompletedProcess[bytes]) -> str:
 
 
 def limit_process(seconds: int) -> None:
-    """Memory and seconds of the processor, where the platform can: Windows has no such limits."""
+    """Limits the memory and processor time of this process; Windows has no such limits."""
     try:
         import resource
     except ImportError:

@@ -155,12 +155,20 @@ class Audit(Tabular):
         return TitledTable(title, ("equation", "component", "branch", "domain", "verdict"), lines)
 
 
+Progress = Callable[[int, int], None]
+"""A function of (statements judged, of how many)."""
+
+
+def silent(_done: int, _of: int) -> None:
+    """No report of progress."""
+
+
 def judge(
-    statements: Sequence[Statement], setting: Setting, progress: Callable[[int, int], None] = lambda done, of: None
+    statements: Sequence[Statement], setting: Setting, progress: Progress = silent
 ) -> tuple[StatementVerdict, ...]:
-    """The verdict on each statement, in their order.  progress: hears after each how many are done, of how many."""
+    """The verdict on each statement, in their order."""
     statements = [
-        # an identity that says nothing of a motion rests on what stands in it
+        # an identity without a motion rests on the needs of its own terms
         s if s.formulas != Formulas() else replace(s, formulas=Formulas(needs=conditions_of([s.residual])))
         for s in statements
     ]

@@ -22,7 +22,7 @@ from heavytop.features.claims.algebra.ring import where_provable
 from heavytop.features.claims.algebra.statement import ALL, TIME, Statement
 from heavytop.features.claims.algebra.structure import rationals
 from heavytop.features.claims.audit.context import ClaimFile
-from heavytop.features.claims.audit.judge import StatementVerdict, verdict_of
+from heavytop.features.claims.audit.judge import Progress, StatementVerdict, silent, verdict_of
 from heavytop.features.claims.audit.user_claims import UserMotion
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
 from heavytop.top.stability import is_stable, quadratic_of_squares, stability
@@ -56,8 +56,12 @@ class UserStability(UserMotion):
             raise InputError(f"A claim of stability must be about heavy_top; got {about.name}.", "Leave out the rotor.")
         return about
 
-    def judged(self, about: System, rows: Sequence[StatementVerdict]) -> StatementVerdict:
-        """The verdict on the stability, where ``rows`` are those of the equations of motion."""
+    def rows(self, about: System, progress: Progress = silent) -> tuple[StatementVerdict, ...]:
+        """The verdicts on the equations of motion, and on the stability."""
+        rows = super().rows(about, progress)
+        return (*rows, self._stability(about, rows))
+
+    def _stability(self, about: System, rows: Sequence[StatementVerdict]) -> StatementVerdict:
         claimed = bool(self.content.stable)
         is_steady = verdict_of(rows) == "holds"
         opposite = next(self._opposites(about), None) if is_steady else None

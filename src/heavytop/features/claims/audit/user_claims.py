@@ -1,16 +1,21 @@
-"""A motion claimed in a file as statements."""
+"""Claims in files: motions, first integrals and invariant relations as statements, and their audits."""
 
 from __future__ import annotations
 
+import re
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import islice
+from time import perf_counter
 
+import msgspec
 import sympy
+from msgspec import structs
 
-from heavytop.errors import InputError
+from heavytop.errors import HeavyTopError, InputError
 from heavytop.features.claims.algebra.conditions import (
     Need,
     all_over,
@@ -32,16 +37,17 @@ from heavytop.features.claims.audit.context import (
     ClaimFile,
     Clock,
     Context,
-    FileClaim,
     IntegralTable,
     needs_of,
+    of_file,
+    parse_context,
     read_clock,
     sample_number,
     setting_of,
     three,
     variable_of,
 )
-from heavytop.features.claims.audit.judge import ExplanationStep, StatementVerdict, judge, verdict_of
+from heavytop.features.claims.audit.judge import Audit, Progress, StatementVerdict, judge, silent, verdict_of
 from heavytop.features.claims.audit.statements import (
     SYMBOLIC,
     ClaimedMotion,
@@ -54,9 +60,104 @@ from heavytop.features.claims.audit.statements import (
 )
 from heavytop.precision import shown
 from heavytop.top.attitude import omega_from_angles
-from heavytop.top.equations import GYROSTAT, System
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, System
 
 Rate = Callable[[sympy.Expr], sympy.Expr]
+_NO_FORMULAS = ("name", "kind", "stable", "system", "source", "domain", "assume", "parameters", "definitions", "entry")
+_SEARCH, _MOST_ASSUMPTIONS = 6.0, 3
+"""Seconds for assumptions that would decide a claim, and the largest number of them."""
+
+
+class FileClaim(ABC):
+    """A claim of a file: its kind is motion, component, integral, relation or stability."""
+
+    def __init__(self, content: ClaimFile) -> None:
+        self.content = content
+        self.context = parse_context(content, self.variables)
+        self.name, self.source, self.kind = content.name, content.source, content.kind
+
+    @property
+    @abstractmethod
+    def variables(self) -> tuple[sympy.Symbol, ...]:
+        """The symbols other than parameters that its formulas may hold."""
+
+    @property
+    @abstractmethod
+    def setting(self) -> Setting:
+        """The file's assumptions and samples."""
+
+    @abstractmethod
+    def statements(self, system: System) -> list[Statement]:
+        """The equations of the claim about ``system``."""
+
+    def rows(self, about: System, progress: Progress = silent) -> tuple[StatementVerdict, ...]:
+        """The verdicts on all statements."""
+        return judge(self.statements(about), self.setting, progress)
+
+    def solves(self, about: System, rows: Sequence[StatementVerdict]) -> tuple[str, ...]:
+        """The systems that every equation is proven for; ``rows`` are those about ``about``."""
+        judged = {s.name: rows if s is about else judge(self.statements(s), self.setting) for s in self.context.systems}
+        return tuple(name for name, rows in judged.items() if verdict_of(rows) == "holds")
+
+    def about(self, requested: System | None) -> System:
+        """The system requested, else the file's, else `heavy_gyrostat` where it gives k, else `heavy_top`.
+
+        Raises InputError where the file names another system, or gives another rotor than the system has.
+        """
+        default = HEAVY_TOP if self.context.carried is None else HEAVY_GYROSTAT
+        about = of_file(requested, self.content.system, default)
+        self.context.parameters(about)
+        return about
+
+    def audit(self, about: System, progress: Progress = silent) -> Audit:
+        """The audit as a claim about a system."""
+        content, began = self.content, perf_counter()
+        rows = self.rows(about, progress)
+        deciding = () if verdict_of(rows) != "undecided" else self._deciding(about, rows, perf_counter() - began)
+        return Audit(
+            self.name,
+            about.name,
+            self.source,
+            rows,
+            solves=self.solves(about, rows),
+            kind=self.kind,
+            entry=content.entry,
+            deciding=deciding,
+            unused=self._unused(),
+            where=() if content.integral is None else tuple(content.integral.where),
+        )
+
+    def _deciding(self, about: System, rows: Sequence[StatementVerdict], seconds: float) -> tuple[tuple[str, str], ...]:
+        """Assumptions each of which decides an undecided claim, with the verdict then.
+
+        seconds: duration of the audit; the search ends after :data:`_SEARCH`.
+        """
+        began, assumed = perf_counter(), self.content.assume
+        signs = set(re.findall(r"\w+", " ".join(text for text in assumed if "!=" not in text)))
+        bounds = [c.assumption for row in rows for c in row.conditions if c.assumption and not c.discharged]
+        bounds += [f"{name} > 0" for name in self.content.parameters if name not in signs]
+        deciding: list[tuple[str, str]] = []
+        for bound in dict.fromkeys(bounds):
+            if perf_counter() - began + 2 * seconds > _SEARCH or len(deciding) == _MOST_ASSUMPTIONS:
+                break
+            if (bound.replace(">", "!="), "holds") in deciding:  # a weaker one suffices
+                continue
+            try:
+                claim = type(self)(structs.replace(self.content, assume=[*assumed, bound]))
+                verdict = verdict_of(claim.rows(about))
+            except HeavyTopError:  # a sample breaks it, or the formula may not be assumed
+                continue
+            if verdict != "undecided":
+                deciding.append((bound, verdict))
+        return tuple(deciding)
+
+    def _unused(self) -> tuple[str, ...]:
+        """The parameters that no formula uses, nor a definition that a formula uses."""
+        tables = {name: part for name, part in structs.asdict(self.content).items() if name not in _NO_FORMULAS}
+        words = set(re.findall(r"\w+", str(msgspec.to_builtins(tables))))
+        for name, text in reversed(self.content.definitions.items()):
+            words |= set(re.findall(r"\w+", text)) if name in words else set()
+        return tuple(name for name in self.content.parameters if name not in words)
 
 
 def _expressions(formulas: tuple[Formula, Formula, Formula]) -> Triple:
@@ -100,14 +201,15 @@ class UserMotion(FileClaim):
                 formulas = self.motion.angle_formulas
                 yield Statement("3.2", component, "smooth", self.motion.domain, ours - theirs, text, formulas)
 
-    def explain(self, about: System, rows: Sequence[StatementVerdict]) -> tuple[list[ExplanationStep], tuple[str, ...]]:
-        """No steps; the systems whose (1.1), (1.2) are proven, with |γ| = 1."""
-        return [], tuple(s.name for s in self.context.systems if self._verdict(s, about, rows) == "holds")
+    def solves(self, about: System, rows: Sequence[StatementVerdict]) -> tuple[str, ...]:
+        """The systems that (1.1), (1.2) and |γ| = 1 are proven for."""
 
-    def _verdict(self, system: System, about: System, rows: Sequence[StatementVerdict]) -> str:
-        if system is about:
-            return verdict_of([row for row in rows if _is_of_motion(row)])
-        return verdict_of(judge([s for s in self.statements(system) if _is_of_motion(s)], self.setting))
+        def judged(system: System) -> Sequence[StatementVerdict]:
+            if system is about:
+                return [row for row in rows if _is_of_motion(row)]
+            return judge([s for s in self.statements(system) if _is_of_motion(s)], self.setting)
+
+        return tuple(s.name for s in self.context.systems if verdict_of(judged(s)) == "holds")
 
 
 def _is_of_motion(row: StatementVerdict | Statement) -> bool:
@@ -455,11 +557,6 @@ class UserIntegral(FileClaim):
             Need(need.kind, names.put_into(all_over(need.expression, [OFF_SPHERE])), need.text) for need in needs
         )
         return named, renamed, names.meanings
-
-    def explain(self, about: System, rows: Sequence[StatementVerdict]) -> tuple[list[ExplanationStep], tuple[str, ...]]:
-        """No steps; the systems that keep it, by proof."""
-        judged = {s.name: rows if s is about else judge(self.statements(s), self.setting) for s in self.context.systems}
-        return [], tuple(name for name, rows in judged.items() if verdict_of(rows) == "holds")
 
 
 def _numbers(states: Sequence[Sequence[str]]) -> list[Point]:

@@ -29,7 +29,7 @@ from heavytop.exact.flint.balls import (
     working_precision,
 )
 from heavytop.features.claims.audit.context import Tensor, Text, Three, of_file
-from heavytop.features.claims.audit.judge import StatementVerdict
+from heavytop.features.claims.audit.judge import Audit, Progress, StatementVerdict, silent
 from heavytop.features.claims.library.entry import Entry
 from heavytop.precision import decimal_text, dot, exact, round_to
 from heavytop.top.attitude import Output, rotated, transposed
@@ -229,8 +229,6 @@ def judge_figure(figure: Figure, known: Fraction | arb) -> Judgement:
 class ValueClaim:
     """Published numbers of one motion."""
 
-    kind = "value"
-
     def __init__(self, content: ValueFile, entry: Entry | None = None) -> None:
         self.content, self.entry = content, entry
         self.figures = tuple(_figures(content.value))
@@ -245,6 +243,11 @@ class ValueClaim:
         about = of_file(asked, self.content.system, usual)
         require_no_other_rotor(about, self.motion[0])
         return about
+
+    def audit(self, about: System, _progress: Progress = silent) -> Audit:
+        """The audit as a claim about a system."""
+        content = self.content
+        return Audit(content.name, about.name, content.source, self.rows(about), kind=content.kind, entry=self.entry)
 
     def rows(self, about: System) -> tuple[StatementVerdict, ...]:
         """A verdict on each number, in the order of the file; raises InputError for a quantity that is not known."""

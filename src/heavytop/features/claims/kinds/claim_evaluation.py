@@ -1,9 +1,8 @@
-"""The printed and the stable formulas (4.2)-(4.6), evaluated in a format, against themselves exactly evaluated."""
+"""The printed and the stable formulas (4.2)-(4.6) evaluated in a format, against their exact evaluation."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import fields
 from fractions import Fraction
 
 from msgspec.structs import replace
@@ -40,7 +39,7 @@ class ClaimEvaluationTable(PlanTable, tag=NAME):
     directions: tuple[Direction, ...] = ("forward", "backward")
 
     def tasks(self, find: Find) -> list[Task]:
-        """One a row."""
+        """A task for each row."""
         times = positive(self.rate_times, "rate_times")
         tasks = []
         for case in claimed(find, self.cases):
@@ -56,7 +55,7 @@ class ClaimEvaluationTable(PlanTable, tag=NAME):
 
 
 class ClaimEvaluation(Kind):
-    """The largest errors of a form in a format, and from when on its values are not finite.
+    """The largest errors of a form in a format, and the time from which on its values are not finite.
 
     The times of a task are values of k t of one sign.  Errors of Ω in 1/time unit, of the angles in rad.
     """
@@ -83,7 +82,7 @@ class ClaimEvaluation(Kind):
         metrics: dict[Quantity, Metric] = {}
         series: dict[str, Series] = {}
         with working_precision(precision.bits + 64):
-            for name in (field.name for field in fields(errors_of.EvaluationError)):
+            for name in errors_of.EvaluationError._fields:
                 values = [getattr(error, name) for error in errors]
                 finite = [value for value in values if value.is_finite()]
                 worst = metric(largest(finite)) if finite else Metric("missing", None)
@@ -102,7 +101,7 @@ class ClaimEvaluation(Kind):
         return replace(row, finite=is_finite)
 
     def contradictions(self, row: Row) -> Iterator[str]:
-        """A series holds every sample: those that are not finite are counted, and the last begin somewhere."""
+        """Counts, times and largest errors other than those of the series, which holds every sample."""
         for series in row.series.values():
             component = series.quantity.component if series.quantity else ""
             count, since = row.metric(_COUNT, component, _LOST), row.metric(_COUNT, component, _SINCE)
@@ -117,7 +116,7 @@ class ClaimEvaluation(Kind):
                 yield f"{Quantity(EVALUATION_ERROR, component, _WORST).text}: not the largest of its series"
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
-        """How far off each form is in the narrowest format, and until when it is finite; a line a form and format."""
+        """The errors of each form in the narrowest format, the time up to which it is finite; a line for each row."""
         bits = min(row.bits for row in rows)
         forms: dict[str, list[Row]] = {}
         for row in rows:

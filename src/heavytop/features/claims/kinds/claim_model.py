@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import fields
 from fractions import Fraction
 from functools import cache, lru_cache, partial
 from typing import Any, cast
@@ -15,6 +14,7 @@ from heavytop.cases import Case
 from heavytop.errors import InputError, OutOfReach
 from heavytop.exact.cases.delone import DeloneHomoclinic
 from heavytop.exact.cases.ershkov_partial import ErshkovPartial
+from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import FUNCTIONS, working_precision
 from heavytop.features.claims import claim_error as errors_of
 from heavytop.features.claims.claim_error import CLAIM_XI, divergence_time, true_solution
@@ -59,16 +59,13 @@ from heavytop.top.equations import HEAVY_TOP
 
 BRANCHES = "smooth: roots continued through t = 0; printed: all roots positive; -2, -6: I1/I3."
 
-# What the kinds about the formulas of a claim share.
-
-
 CLAIM = "claimed: (4.2)-(4.6)"
 MODEL_ERROR, EVALUATION_ERROR = "claim_model_error", "claim_evaluation_error"
-"""Errors of a claim: of its formulas, and of their evaluation in a format.  The third is an integrator's."""
+"""Errors of a claim: of its formulas, and of their evaluation in a format."""
 
 
 def claimed(find: Find, names: list[str]) -> Iterator[Case]:
-    """The cases of these names; raises InputError for one about which nothing is claimed."""
+    """The cases of these names; raises InputError for a case without a claim."""
     for case in map(find, names):
         if not isinstance(case.homoclinic, ErshkovPartial):
             raise InputError(f"Nothing is claimed about the case {case.name}.", "Use a case such as ershkov-partial-2.")
@@ -76,7 +73,7 @@ def claimed(find: Find, names: list[str]) -> Iterator[Case]:
 
 
 def claim_of(case: Case) -> PartialCase:
-    """The claim about a case: its formulas have the data of the exact motion that they solve."""
+    """The claim with the data of a case, which is the exact motion that its formulas solve."""
     known = case.homoclinic
     assert isinstance(known, ErshkovPartial)
     return PartialCase(known.alpha, known.i1, known.i3)
@@ -140,17 +137,17 @@ def claim_error(sources: Sources, first: Iterable[str] = ()) -> Section | None:
 
 
 _LOWEST = -26
-"""No smaller error of a formula in floating point is drawn: where Ω itself tends to 0, so does its error."""
+"""log10 of the smallest error that is drawn: where Ω tends to 0, so does its error in floating point."""
 
 
 def _series(row: Row, name: str) -> dict[str, Series]:
-    """The series of a row that are of the quantity of that name, by their components."""
+    """The series of the quantity of that name, by their components."""
     series = [(series.quantity, series) for series in row.series.values() if series.quantity and series.times]
     return {quantity.component: series for quantity, series in series if quantity.name == name}
 
 
 def _claim_parts(rows: Sequence[Row], quantity: str, source: str) -> Iterator[tuple[Key, Series, float, str]]:
-    """The curves of one case: label, series, what a unit of its times is in |t|, and what it is an error of.
+    """The curves of one case: label, series, the unit of its times in |t|, and the quantity of the error.
 
     quantity: omega or attitude; of formulas in floating point the part of the attitude is ψ.
     """
@@ -159,18 +156,18 @@ def _claim_parts(rows: Sequence[Row], quantity: str, source: str) -> Iterator[tu
     in_format = "psi" if quantity == "attitude" else quantity
     for row in rows:
         subject, precision = row.key.subject, clip(row.precision, 20)
-        if subject.branch == "smooth" and (model_error_series := _series(row, MODEL_ERROR).get(quantity)):
-            yield Key(f"model{suffix}", 1, "s", "", old), model_error_series, 1.0, _symbol(quantity)
-        if row.bits == bits and (model_error_series := _series(row, EVALUATION_ERROR).get(in_format)):
-            ends = [logarithm(end) for end in (row.horizon, model_error_series.times[-1])]
+        if subject.branch == "smooth" and (series := _series(row, MODEL_ERROR).get(quantity)):
+            yield Key(f"model{suffix}", 1, "s", "", old), series, 1.0, _symbol(quantity)
+        if row.bits == bits and (series := _series(row, EVALUATION_ERROR).get(in_format)):
+            ends = [logarithm(end) for end in (row.horizon, series.times[-1])]
             scale = 10 ** ((ends[0] or 0.0) - (ends[1] or 0.0))
             colour, marker = (3, "D") if subject.form == "printed" else (2, "^")
             label = f"evaluation, {clip(subject.form, 20)} form, {precision}{suffix}"
-            yield Key(label, colour, marker, "", old), model_error_series, scale, _symbol(in_format)
-        if row.bits == bits and (model_error_series := _series(row, INTEGRATION_ERROR).get(quantity)):
+            yield Key(label, colour, marker, "", old), series, scale, _symbol(in_format)
+        if row.bits == bits and (series := _series(row, INTEGRATION_ERROR).get(quantity)):
             label = f"integration, {clip(row.integrator, 20)}, {precision}{suffix}"
             colour, marker = (0, "o") if subject.name == HEYOKA else (4, "v")
-            yield Key(label, colour, marker, "", old), model_error_series, 1.0, _symbol(quantity)
+            yield Key(label, colour, marker, "", old), series, 1.0, _symbol(quantity)
 
 
 def _symbol(quantity: str) -> str:
@@ -180,29 +177,20 @@ def _symbol(quantity: str) -> str:
 def _claim_curve(
     axes: Any, section: Section, key: Key, series: Series, scale: float, case: str, symbol: str
 ) -> list[str]:
+    """Draws one curve, adds its line to the table, and returns its alternative text."""
     x, y = points(series, 0.0, scale)
-    dead = [logarithm(t) for t, v in zip(series.times, series.values, strict=False) if v == "nan"]
-    lost = sorted(t + math.log10(scale) for t in dead if t is not None)
+    undefined = [logarithm(t) for t, v in zip(series.times, series.values, strict=False) if v == "nan"]
+    lost = sorted(t + math.log10(scale) for t in undefined if t is not None)
     if lost:
-        colour = COLOURS[key.colour]
-        axes.plot(
-            lost, [0.99] * len(lost), "x", transform=axes.get_xaxis_transform(), color=colour, ms=4, clip_on=False
-        )
+        top, colour = axes.get_xaxis_transform(), COLOURS[key.colour]
+        axes.plot(lost, [0.99] * len(lost), "x", transform=top, color=colour, ms=4, clip_on=False)
     if x:
         draw(axes, key, x, y)
     at_one = next((v for t, v in zip(x, y, strict=True) if abs(t) < 1e-6), None)
     exact = bool(series.values) and all(value == "0" for value in series.values)
     largest = scientific(max(y)) if y else "0 (exact)" if exact else "none finite"
-    section.rows.append(
-        [
-            clip(case, 40),
-            key.label,
-            symbol,
-            "" if at_one is None else scientific(at_one),
-            largest,
-            scientific(lost[0]) if lost else "",
-        ]
-    )
+    cells = [symbol, "" if at_one is None else scientific(at_one), largest, scientific(lost[0]) if lost else ""]
+    section.rows.append([clip(case, 40), key.label, *cells])
     tail = f", not finite from |t| = {scientific(lost[0])}" if lost else ""
     return [f"{key.label}: largest sample {largest}{tail}."]
 
@@ -215,8 +203,9 @@ _BRANCHES: dict[Direction, tuple[Branch, ...]] = {"forward": ("smooth", "printed
 
 
 class ClaimModelTable(PlanTable, tag=NAME):
-    """times: where the series is taken, t > 0.  grid: the largest errors are also over a uniform grid of that many
-    points up to the last time.
+    """times: of the series, t > 0.  grid: the number of points of a uniform grid up to the last time.
+
+    The largest errors are over both.
     """
 
     cases: list[str]
@@ -225,24 +214,24 @@ class ClaimModelTable(PlanTable, tag=NAME):
     directions: tuple[Direction, ...] = ("forward", "backward")
 
     def tasks(self, find: Find) -> list[Task]:
-        """One a row."""
+        """A task for each row."""
         times = positive(self.times, "times")
-        every = sorted({*times, *(times[-1] * i / self.grid for i in range(1, samples(self.grid) + 1))})
+        grid = sorted({*times, *(times[-1] * i / self.grid for i in range(1, samples(self.grid) + 1))})
         tasks = []
         for case in claimed(find, self.cases):
             for direction in self.directions:
-                signs = signed(every, direction), signed(times, direction)
+                signs = signed(grid, direction), signed(times, direction)
                 for branch in _BRANCHES[direction]:
                     subject = Subject("claimed", "(4.2)-(4.6)", branch=branch)
                     end = time_text(signs[1][-1])
                     key = RowKey(NAME, case.name, HEAVY_TOP.name, subject, direction=direction, horizon=end)
-                    asked = {"grid": str(self.grid)}
-                    tasks.append(Task(key, f"/{direction}", f"claim:{branch}", case, *signs, request=asked))
+                    request = {"grid": str(self.grid)}
+                    tasks.append(Task(key, f"/{direction}", f"claim:{branch}", case, *signs, request=request))
         return tasks
 
 
 class ClaimModel(Kind):
-    """The largest errors of the claim over the times, and from when on Ω is off by 1 % of α.
+    """The largest errors of the claim over the times, and the time from which on Ω is off by 1 % of α.
 
     Errors of Ω in 1/time unit, of γ none, of the angles in rad.
     """
@@ -264,26 +253,27 @@ class ClaimModel(Kind):
         metrics: dict[Quantity, Metric] = {}
         series = {}
         with working_precision(errors_of.MODEL_BITS):
-            for name in (field.name for field in fields(errors_of.ModelError)):
+            for name in errors_of.ModelError._fields:
                 quantity = Quantity(MODEL_ERROR, name)
                 values = {time: getattr(error, name) for time, error in errors.items()}
                 metrics[quantity.over("max")] = metric(largest(values.values()), "value")
-                kept = [text(abs(values[time]), 12) for time in task.keep]
-                series[quantity.text] = Series([time_text(time) for time in task.keep], kept, quantity)
-            parted = divergence_time(claim, task.times[-1], branch)
-            metrics[PARTS] = time_metric(None if parted is None else parted.time, "value")
+                texts = [text(abs(values[time]), 12) for time in task.keep]
+                series[quantity.text] = Series([time_text(time) for time in task.keep], texts, quantity)
+            divergence = divergence_time(claim, task.times[-1], branch)
+            metrics[PARTS] = time_metric(None if divergence is None else divergence.time, "value")
         measured = f"{CLAIM}, {branch} branch, exactly evaluated"
         return exact_row(task, measured, against, by_name(metrics), errors_of.MODEL_BITS, series)
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
-        """When the claim is off by 1 %; a line a case and branch; how wrong it is, forward in time, and in full on the
-        smooth branch where there are several.
+        """The divergence times, a table of errors by case and branch, and cards of the motions forward in time.
+
+        A card is about the smooth branch where a case has several.
         """
-        parted = [row for row in rows if PARTS.text in row.metrics]
-        if parted:
-            yield _headline(parted)
-        forward = [row for row in parted if row.key.direction != "backward"]
-        yield from _parting_times(forward)
+        measured = [row for row in rows if PARTS.text in row.metrics]
+        if measured:
+            yield _headline(measured)
+        forward = [row for row in measured if row.key.direction != "backward"]
+        yield from _divergence_times(forward)
         times = [time for time in _SHOWN if any(exact(time) in _values(row, "omega") for row in rows)]
         heads = (*(f"ΔΩ at |t|={t}" for t in times), *(f"Δγ at |t|={t}" for t in times[:2]))
         yield Cells(
@@ -303,25 +293,22 @@ class ClaimModel(Kind):
         smooth = {row.case for row in forward if row.key.subject.branch == "smooth"}
         for row in forward:
             if row.case not in smooth or row.key.subject.branch == "smooth":
-                yield _card(
-                    row,
-                    [alternative for alternative in forward if alternative.case == row.case and alternative is not row],
-                )
+                yield _card(row, [other for other in forward if other.case == row.case and other is not row])
         yield Chart(claim_error, of_all=True)
 
 
 def _headline(rows: Sequence[Row]) -> Headline:
     """The first time at which a claimed Ω is off by 1 %."""
-    parted = [(time, row) for row in rows if (time := row.metrics[PARTS.text].log10) is not None]
-    if parted:
-        _, row = min(parted, key=lambda pair: pair[0])
+    diverged = [(time, row) for row in rows if (time := row.metrics[PARTS.text].log10) is not None]
+    if diverged:
+        _, row = min(diverged, key=lambda pair: pair[0])
         at, where = f"|t| = {short(row.metrics[PARTS.text].value)}", f"{clip(row.case, 40)}, {row.key.subject.branch}"
         return Headline(f"The claimed Ω is off by 1 % of α = Ω3(0) I3/I1 from {at} on ({where}).")
     horizon = short(max((row.horizon.removeprefix("-") for row in rows), key=exact))
     return Headline(f"The claimed Ω stays within 1 % of α of the true motion up to |t| = {horizon}.")
 
 
-def _parting_times(rows: Sequence[Row]) -> Iterator[Cells]:
+def _divergence_times(rows: Sequence[Row]) -> Iterator[Cells]:
     by_branch: dict[str, dict[str, str]] = {}
     for row in rows:
         by_branch.setdefault(row.key.case, {})[row.key.subject.branch] = short(row.metrics[PARTS.text].value, 2)
@@ -339,9 +326,9 @@ def _cells(row: Row, times: Sequence[str]) -> list[Cell]:
 
 
 def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[errors_of.Truth, Against]:
-    """The true heavy-top motion from the claim's own data, and what it is: a closed form, an enclosure, or two runs.
+    """The true heavy-top motion from the claim's data at ``times``: by a closed form, an enclosure, or two runs.
 
-    times: those at which it will be asked for.  Raises OutOfReach where it is not known up to the last of them.
+    Raises OutOfReach where it is not known up to the last of the times.
     """
     bits = errors_of.MODEL_BITS
     known = true_solution(claim)
@@ -350,32 +337,25 @@ def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[errors_o
     except OutOfReach:
         if isinstance(known, DeloneHomoclinic):
             raise
-        problem_of_system = partial(Problem.of, known.top, known.start, xi=CLAIM_XI)
-        (computed,) = compute([problem_of_system], times, bits)
-        return lambda time: (computed.state(time)[:6], computed.state(time)[6:]), computed.against
+        (computed,) = compute([partial(Problem.of, known.top, known.start, xi=CLAIM_XI)], times, bits)
+        return computed.state, computed.against
     if proven is None:
         raise OutOfReach(f"{known.method} is not certified to {bits} bits.", "Ask for earlier times.")
-    if not isinstance(known, DeloneHomoclinic):
+    return cache(partial(_state_and_attitude, known)), proven.against
 
-        @cache
-        def enclosed(time: Fraction) -> tuple[list[arb], list[arb]]:
-            values = known.with_attitude(time, bits)
-            return values[:6], values[6:]
 
-        return enclosed, proven.against
-
-    @cache
-    def delone(time: Fraction) -> tuple[list[arb], list[arb]]:
-        phi, theta, psi = known.angles(time, bits)
-        with working_precision(bits):
-            xi = attitude_from_angles(phi, theta, psi - arb.pi() / 2, FUNCTIONS)
-        return known.state(time, bits), list(xi)
-
-    return delone, proven.against
+def _state_and_attitude(known: DeloneHomoclinic | Validated, time: Fraction) -> Sequence[arb]:
+    bits = errors_of.MODEL_BITS
+    if isinstance(known, Validated):
+        return known.with_attitude(time, bits)
+    phi, theta, psi = known.angles(time, bits)
+    with working_precision(bits):
+        xi = attitude_from_angles(phi, theta, psi - arb.pi() / 2, FUNCTIONS)
+    return [*known.state(time, bits), *xi]
 
 
 _shared_motion = lru_cache(maxsize=2)(true_motion)
-"""The true motion, which the branches of a claim share."""
+"""The true motion, shared by the branches of a claim."""
 
 
 def _values(row: Row, component: str) -> dict[Fraction, str]:
@@ -385,17 +365,17 @@ def _values(row: Row, component: str) -> dict[Fraction, str]:
 
 
 def _card(row: Row, others: Iterable[Row]) -> Card:
-    """The branch of a row in full, and when its other branches part from the true motion."""
-    horizon, parts_at = short(row.horizon.removeprefix("-")), short(row.metrics[PARTS.text].value)
+    """The errors of one branch, and the divergence times of the others."""
+    horizon, divergence = short(row.horizon.removeprefix("-")), short(row.metrics[PARTS.text].value)
     largest = row.metric(MODEL_ERROR, "omega", "max")
     over = f"over {row.samples} samples" if row.samples else "over the samples"
-    if parts_at == "never":
+    if divergence == "never":
         lines = [Note(f"Ω stays within 1 % of α of the true motion up to |t| = {horizon}.")]
     else:
         explanation = "The first time at which the largest component of |ΔΩ| from the true motion is 1 % of α, proven. "
         largest_error = short(largest.value) if largest else "missing"
         explanation += f"The largest error {over} up to |t| = {horizon} is {largest_error}."
-        lines = [Note(f"|t| = {parts_at}", style="big"), Note(explanation)]
+        lines = [Note(f"|t| = {divergence}", style="big"), Note(explanation)]
     for other in others:
         at = short(other.metrics[PARTS.text].value)
         when = f"not up to |t| = {horizon}" if at == "never" else f"from |t| = {at}"

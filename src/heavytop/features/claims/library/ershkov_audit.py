@@ -7,7 +7,7 @@ makes of it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import combinations_with_replacement
@@ -18,7 +18,7 @@ import sympy
 from heavytop.errors import InputError
 from heavytop.features.claims.algebra.conditions import conditions_of
 from heavytop.features.claims.algebra.statement import AFTER, ALL, BEFORE, Domain, Formulas, Setting, Statement
-from heavytop.features.claims.audit.judge import ExplanationStep, StatementVerdict, judge, verdict_of
+from heavytop.features.claims.audit.judge import Audit, ExplanationStep, Progress, judge, silent, verdict_of
 from heavytop.features.claims.audit.statements import (
     SYMBOLIC,
     SYSTEMS,
@@ -98,11 +98,12 @@ class _PaperClaim:
         about = [statement for motion in motions for statement in motion_statements(motion, self.parameters, system)]
         return [*about, *self._steps()]
 
-    def explain(
-        self: Any, _about: System, _rows: Sequence[StatementVerdict]
-    ) -> tuple[list[ExplanationStep], tuple[str, ...]]:
-        """Why det(γ, M, P r) = 0 makes the claim one about the gyrostat."""
-        return explain(self.motion, self.parameters, self.setting)
+    def audit(self: Any, about: System, progress: Progress = silent) -> Audit:
+        """The audit as a claim about a system, with the reason why det(γ, M, P r) = 0 makes it one of the gyrostat."""
+        rows = judge(self.statements(about), self.setting, progress)
+        steps, solves = explain(self.motion, self.parameters, self.setting)
+        constants = tuple((name, str(value)) for name, value in self.setting.constants)
+        return Audit(self.name, about.name, self.source, rows, tuple(steps), solves, constants)
 
     def _branch_parts(self: Any) -> dict[str, tuple[tuple[str, sympy.Expr], ...]]:
         return {name: _parts(self._motion(name, where)) for name, where in (("smooth", _ANY), ("printed", _RISING))}
@@ -120,8 +121,6 @@ class PartialClaim(_PaperClaim):
     theta: Formula = ershkov.theta
     psi: Formula = ershkov.psi
     name: str = "ershkov-partial"
-    kind: str = "motion"
-    entry: None = None
     source: str = f"{SOURCE}, (4.1)-(4.6), (6.1)-(6.2)"
 
     @property
@@ -256,8 +255,6 @@ class GeneralClaim(_PaperClaim):
     f1: Formula = ershkov_general.f1
     f2: Formula = ershkov_general.f2
     name: str = "ershkov-general"
-    kind: str = "motion"
-    entry: None = None
     source: str = f"{SOURCE}, (2.1)-(2.4), (3.3), (3.4)"
 
     @property
