@@ -8,7 +8,7 @@ from flint import fmpq_mpoly_ctx
 
 from exact.test_goryachev_chaplygin import UP, motion_from, random_motion
 from heavytop.errors import OutOfReach
-from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplyginAttitude, Torus, _motion
+from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplyginAttitude, _motion
 from heavytop.exact.flint.balls import ball, working_precision
 from support.proofs import assert_attitude, assert_meets, attitude_of
 
@@ -75,9 +75,9 @@ def test_the_strips_are_analytic_as_far_as_they_say(seed):
     motion = random_motion(seed)
     with working_precision(128):
         form = _motion(motion)
-        torus = Torus.of(form)
+        uniform = GoryachevChaplyginAttitude.of(form).uniform
         a, h = float(form.size), float(ball(form.level.energy))
-        for k, one in enumerate(torus.uniform):
+        for k, one in enumerate(uniform):
             height, middle = float(one.width * one.gap.means[0]), form.line.variables[k].middle
             beside = form.line.variables[1 - k]
             other = float(beside.middle + (2 * k - 1) * -beside.reach)

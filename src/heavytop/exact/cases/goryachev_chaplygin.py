@@ -17,7 +17,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -34,6 +33,7 @@ from heavytop.exact.flint.balls import (
     ball,
     current_length,
     series_length,
+    the_only,
     working_precision,
 )
 from heavytop.exact.separable.abel import (
@@ -45,6 +45,7 @@ from heavytop.exact.separable.abel import (
     Rest,
     Symmetry,
     Variable,
+    alternate,
     counts,
     decide,
     error_of,
@@ -150,25 +151,17 @@ def separated_start(level: GoryachevLevel) -> tuple[arb, arb]:
     return (larger, -smaller) if axial >= 0 else (smaller, -larger)
 
 
-def gap_ends(level: GoryachevLevel, curve: Sequence[Root], places: Sequence[arb]) -> list[tuple[int, int]]:
+def gap_ends(level: GoryachevLevel, curve: Sequence[Root], values: Sequence[arb]) -> list[tuple[int, int]]:
     """Between which two real roots u1 and u2 move; the same root twice for a variable that stays there.
 
     Raises Undecided where the balls do not tell.
     """
     resting = _resting(level, curve)
-    allowed, inside = [], False
-    for low, high in pairwise([i for i in ordered([root.value for root in curve]) if i not in resting.values()]):
-        inside ^= curve[low].multiplicity % 2 == 1
-        if inside:
-            allowed.append((low, high))
-    ends = []
-    for k, u in enumerate(places):
-        possible = [ends for ends in allowed if not (u < curve[ends[0]].value.real or u > curve[ends[1]].value.real)]
-        if k in resting:
-            possible = [(resting[k], resting[k])]
-        if len(possible) != 1:
-            raise Undecided
-        ends += possible
+    real = [i for i in ordered([root.value for root in curve]) if i not in resting.values()]
+    allowed, ends = alternate(real, [root.multiplicity for root in curve], False), []
+    for k, u in enumerate(values):
+        holding = [pair for pair in allowed if not (u < curve[pair[0]].value.real or u > curve[pair[1]].value.real)]
+        ends.append((resting[k], resting[k]) if k in resting else the_only(holding))
     return ends
 
 
@@ -180,9 +173,7 @@ def _resting(level: GoryachevLevel, curve: Sequence[Root]) -> dict[int, int]:
     coinciding = [
         i for i, root in enumerate(curve) if root.multiplicity > 1 and root.value.overlaps(acb(ball(double_root)))
     ]
-    if len(coinciding) != 1:
-        raise Undecided
-    return {0 if double_root > 0 else 1: coinciding[0]}
+    return {0 if double_root > 0 else 1: the_only(coinciding)}
 
 
 # Goryachev and Chaplygin's top, and Sretensky's gyrostat, by real Abel inversion: the state from two phases.
@@ -254,9 +245,7 @@ class GoryachevMotion:
                 position = motion.turned([arb_series([phase], prec=1) for phase in phases], [0, 0])
                 if all(one[0].overlaps(other) for one, other in zip(position, turned, strict=True)):
                     possible.append(motion)
-        if len(possible) != 1:
-            raise Undecided
-        return possible[0]
+        return the_only(possible)
 
     def at(self, time: Fraction, length: int) -> list[BallLike]:
         """The six components at ``time``, numbers, or series in t of that length.
@@ -457,63 +446,14 @@ class Uniform:
 
 
 @dataclass(frozen=True, slots=True)
-class Torus:
-    """Both phases φ.
-
-    sizes: n1, n2.  apart: a lower bound on |u1 − u2| on the strips.
-    """
-
-    uniform: tuple[Uniform, Uniform]
-    sizes: tuple[int, int]
-    apart: arb
-
-    @classmethod
-    def of(cls, motion: GoryachevMotion) -> Torus:
-        """At the working precision; raises as :meth:`GoryachevChaplyginAttitude.of`."""
-        first, second = motion.line.variables
-        above, below = first.middle - _reach(first), second.middle + _reach(second)
-        if not above > below:
-            raise Undecided
-        both = Uniform.of(motion, first, below), Uniform.of(motion, second, above)
-        return cls(both, counts([one.width for one in both]), (1 - 2 * arb(_ROOM)) * (above - below))
-
-    def passed(self, phases: Sequence[arb], turns: Sequence[int]) -> list[arb]:
-        """s of both variables."""
-        return [one.passed(phase, turn) for one, phase, turn in zip(self.uniform, phases, turns, strict=True)]
-
-    def largest(self) -> arb:
-        """A bound on |dΛ/ds|, on either of its two terms, on the strips."""
-        (alpha1, beta1), (alpha2, beta2) = (one.largest for one in self.uniform)
-        return arb(max(alpha1 * beta2, beta1 * alpha2)) / self.apart
-
-    def integral(self, motion: GoryachevMotion, began: Sequence[arb]) -> LineIntegral:
-        """The integral of dΛ/ds from where s is ``began`` for both variables."""
-        halves = [
-            [motion.halves(k, phase, 0) for phase in one.phases(size)]
-            for k, (one, size) in enumerate(zip(self.uniform, self.sizes, strict=True))
-        ]
-        kernel = arb_mat([[-motion.sign / (u - v) for v, _, _ in halves[1]] for u, _, _ in halves[0]])
-        alphas, betas = (
-            [Factor(_symmetry(motion, k, factor), [half[factor + 1] for half in halves[k]]) for k in (0, 1)]
-            for factor in (0, 1)
-        )
-        pairs = [(alphas[0], betas[1]), (betas[0], alphas[1])]
-        largest, rates = self.largest(), [one.rate for one in self.uniform]
-        error = error_of(largest, [one.width for one in self.uniform], self.sizes)
-        return LineIntegral.of(
-            pairs, kernel, rates, [rate * s for rate, s in zip(rates, began, strict=True)], largest, error
-        )
-
-
-@dataclass(frozen=True, slots=True)
 class GoryachevChaplyginAttitude:
     """The azimuth Λ of M beside a motion, at one working precision.
 
-    began: s of both variables at t = 0.
+    uniform: the phases φ.  began: s of both variables at t = 0.  integral: of dΛ/ds from there.
     """
 
     motion: GoryachevMotion
-    torus: Torus
+    uniform: tuple[Uniform, Uniform]
     began: list[arb]
     integral: LineIntegral
 
@@ -524,21 +464,46 @@ class GoryachevChaplyginAttitude:
         Raises Undecided where it does not suffice, OutOfReach for Fourier series of too many terms and for asymptotic
         motions.
         """
-        torus = Torus.of(motion)
-        began = torus.passed(*motion.phases(Fraction(0)))
-        return cls(motion, torus, began, torus.integral(motion, began))
+        first, second = motion.line.variables
+        above, below = first.middle - _reach(first), second.middle + _reach(second)
+        if not above > below:
+            raise Undecided
+        uniform = Uniform.of(motion, first, below), Uniform.of(motion, second, above)
+        widths = [phase.width for phase in uniform]
+        sizes, began = counts(widths), _passed(uniform, *motion.phases(Fraction(0)))
+        halves = [
+            [motion.halves(k, angle, 0) for angle in phase.phases(size)]
+            for k, (phase, size) in enumerate(zip(uniform, sizes, strict=True))
+        ]
+        kernel = arb_mat([[-motion.sign / (u - v) for v, _, _ in halves[1]] for u, _, _ in halves[0]])
+        alphas, betas = (
+            [Factor(_symmetry(motion, k, factor), [half[factor + 1] for half in halves[k]]) for k in (0, 1)]
+            for factor in (0, 1)
+        )
+        # a bound on either term of |dΛ/ds| on the strips, with a lower bound on |u1 − u2| there
+        (alpha1, beta1), (alpha2, beta2) = (phase.largest for phase in uniform)
+        largest = arb(max(alpha1 * beta2, beta1 * alpha2)) / ((1 - 2 * arb(_ROOM)) * (above - below))
+        pairs, rates = [(alphas[0], betas[1]), (betas[0], alphas[1])], [phase.rate for phase in uniform]
+        angles = [rate * s for rate, s in zip(rates, began, strict=True)]
+        error = error_of(largest, widths, sizes)
+        return cls(motion, uniform, began, LineIntegral.of(pairs, kernel, rates, angles, largest, error))
 
     def bearing(self, time: Fraction) -> Bearing:
         """M in the top's own axes, and Λ.  Raises Undecided where the working precision does not prove the phases."""
         phases, turns = self.motion.phases(time)
-        passed, uniform = self.torus.passed(phases, turns), self.torus.uniform
+        passed = _passed(self.uniform, phases, turns)
         # the same for both, but for one at rest
-        moving = 1 if uniform[0].gap is None else 0
-        angles = [one.rate * s for one, s in zip(uniform, passed, strict=True)]
+        moving = 1 if self.uniform[0].gap is None else 0
+        angles = [phase.rate * s for phase, s in zip(self.uniform, passed, strict=True)]
         p, q, r, *gamma = self.motion.turned(phases, turns)
         level, rotor = self.motion.level, ball(self.motion.level.rotor)
-        turned = self.integral.at(angles, passed[moving] - self.began[moving])
-        return Bearing.of(level.in_body(gamma), level.in_body([4 * p, 4 * q, r + rotor]), turned)
+        azimuth = self.integral.at(angles, passed[moving] - self.began[moving])
+        return Bearing.of(level.in_body(gamma), level.in_body([4 * p, 4 * q, r + rotor]), azimuth)
+
+
+def _passed(uniform: Sequence[Uniform], phases: Sequence[arb], turns: Sequence[int]) -> list[arb]:
+    """s of both variables."""
+    return [variable.passed(phase, turn) for variable, phase, turn in zip(uniform, phases, turns, strict=True)]
 
 
 def _reach(variable: Variable) -> arb:

@@ -56,7 +56,7 @@ from heavytop.errors import OutOfReach
 from heavytop.exact.cases.goryachev_chaplygin import GoryachevLevel, separated_start, size_of
 from heavytop.exact.closed_form import ClosedForm, cached_per_precision, constant, instant
 from heavytop.exact.elliptic.jacobi import Jacobi, jacobi, legendre_f
-from heavytop.exact.flint.balls import BallLike, Balls, Undecided, ball, series_length
+from heavytop.exact.flint.balls import BallLike, Balls, ball, series_length, the_only
 from heavytop.exact.separable.oscillation import Bearing, WithBearing
 from heavytop.exact.solution import GAMMA, LEVEL_MOMENTUM, ExactRelation, plane_top
 from heavytop.top.heavy_top import HeavyTop, State
@@ -135,14 +135,13 @@ def _the_one(level: GoryachevLevel, possible: Sequence[Signed]) -> Signed:
     """The motion, of two that differ in σ, that starts as the level says; raises Undecided where balls do not tell."""
     with series_length(1):
         turned = level.turned()
-        candidates = [
-            motion
-            for motion in possible
-            if all(one.overlaps(other) for one, other in zip(motion.state(arb(0)), turned, strict=True))
-        ]
-    if len(candidates) != 1:
-        raise Undecided
-    return candidates[0]
+        return the_only(
+            [
+                motion
+                for motion in possible
+                if all(a.overlaps(b) for a, b in zip(motion.state(arb(0)), turned, strict=True))
+            ]
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -48,14 +48,24 @@ from heavytop.exact.closed_form import ClosedForm, cached_per_precision
 from heavytop.exact.flint.balls import (
     BallLike,
     Balls,
-    Undecided,
     ball,
     coefficient,
     current_length,
     series_length,
+    the_only,
     to_bits,
 )
-from heavytop.exact.separable.abel import REMEDY, Line, Rest, Variable, decide, ordered, refuse, variable_between
+from heavytop.exact.separable.abel import (
+    REMEDY,
+    Line,
+    Rest,
+    Variable,
+    alternate,
+    decide,
+    ordered,
+    refuse,
+    variable_between,
+)
 from heavytop.exact.separable.oscillation import Approach, Azimuth, Bearing, Gap, WithBearing, distance_of_others
 from heavytop.exact.solution import GAMMA, NOT_XI, plane_top
 from heavytop.precision import shown
@@ -89,20 +99,14 @@ def intervals(level: KovalevskayaLevel, curve: Sequence[PhiRoot], start: Working
 def interval_of(variable: int, curve: Sequence[PhiRoot], start: WorkingStart, resting: Sequence[int] = ()) -> Interval:
     """Where w1 (variable 0) or w2 moves, as :func:`intervals`; resting: roots where another variable stays."""
     real = [i for i in ordered([root.value for root in curve]) if i not in resting]
-    allowed, inside = [(real[0] + 1, 0)], True
-    for low, high in pairwise(real):
-        inside ^= curve[low].multiplicity % 2 == 1
-        if inside:
-            allowed.append((high + 1, low + 1))
-    possible = [
+    between = alternate(real, [root.multiplicity for root in curve], True)
+    holding = [
         (upper, lower)
-        for upper, lower in allowed
+        for upper, lower in [(real[0] + 1, 0), *((high + 1, low + 1) for low, high in between)]
         if not (lower > 0 and start.above(variable, curve[lower - 1].value.real) < 0)
         and not start.above(variable, curve[upper - 1].value.real) > 0
     ]
-    if len(possible) != 1:
-        raise Undecided
-    return possible[0]
+    return the_only(holding)
 
 
 def _resting(level: KovalevskayaLevel, curve: Sequence[PhiRoot], start: WorkingStart) -> dict[int, int]:
@@ -110,10 +114,7 @@ def _resting(level: KovalevskayaLevel, curve: Sequence[PhiRoot], start: WorkingS
     double = [i for i, root in enumerate(curve) if root.multiplicity > 1]
     if not double or level.separated(level.double()) != 0:
         return {}
-    resting = {k: double[0] for k in (0, 1) if start.above(k, curve[double[0]].value.real).contains(0)}
-    if len(resting) != 1:
-        raise Undecided
-    return resting
+    return {the_only([k for k in (0, 1) if start.above(k, curve[double[0]].value.real).contains(0)]): double[0]}
 
 
 def pole(curve: Sequence[PhiRoot], occupied: Sequence[Interval]) -> tuple[arb, float]:
@@ -347,10 +348,7 @@ class AbelMotion:
 def _fourth_root(left: BallLike, right: BallLike) -> acb:
     """The one f in {1, i, −1, −i} with left = f right; raises Undecided where more than one can be."""
     sides = [(coefficient(left, n), coefficient(right, n)) for n in range(ORDERS)]
-    possible = [f for f in _UNITS if all((one - f * other).contains(0) for one, other in sides)]
-    if len(possible) != 1:
-        raise Undecided
-    return possible[0]
+    return the_only([f for f in _UNITS if all((a - f * b).contains(0) for a, b in sides)])
 
 
 def branch_points(curve: Sequence[PhiRoot], mu: arb) -> tuple[tuple[acb, ...], arb]:

@@ -42,6 +42,7 @@ from heavytop.exact.flint.balls import (
     midpoint,
     nearest_integer,
     series_length,
+    the_only,
 )
 from heavytop.top.equations import Parameters, heavy_top, kovalevskaya
 
@@ -282,9 +283,7 @@ class HyperellipticCurve:
             if not excluded:
                 middle = (tau[0, 1] + tau[1, 0]) / 2
                 possible.append((inverse, acb_mat([[tau[0, 0], middle], [middle, tau[1, 1]]])))
-        if len(possible) != 1:
-            raise Undecided
-        return cls(tuple(ordered), *possible[0])
+        return cls(tuple(ordered), *the_only(possible))
 
     def image(self, w: arb, y: arb) -> acb_mat:
         """∫ (dw/y, w dw/y) from ∞ to (w, y), modulo periods, times a^−1."""

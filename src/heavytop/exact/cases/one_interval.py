@@ -36,11 +36,12 @@ from heavytop.exact.flint.balls import (
     ball,
     current_precision,
     rational,
+    the_only,
     unit_of_time,
     whole_evaluation,
     working_precision,
 )
-from heavytop.exact.separable.abel import decide, ordered, phase_at
+from heavytop.exact.separable.abel import alternate, decide, ordered, phase_at
 from heavytop.exact.separable.oscillation import MOST_TERMS, Azimuth, Bearing, Gap, Roots, WithBearing
 from heavytop.exact.solution import GAMMA, ON_AXIS_1, ExactRelation
 from heavytop.top.equations import HEAVY_TOP
@@ -246,16 +247,12 @@ def _roots(curve: IntervalCurve) -> list[_End]:
 
 def _gap_ends(roots: Sequence[_End], lead: arb, x: arb) -> tuple[_End, _End]:
     """Between which two real roots of QR the place x lies; raises Undecided where the balls do not tell."""
-    real = [roots[number] for number in ordered([root.place for root in roots])]
-    positive = bool(lead > 0) == (len(roots) % 2 == 0)
-    possible = []
-    for low, high in pairwise(real):
-        positive = not positive
-        if positive and not (x < low.place.real or x > high.place.real):
-            possible.append((low, high))
-    if len(possible) != 1:
-        raise Undecided
-    return possible[0]
+    between = alternate(
+        ordered([root.place for root in roots]), [1] * len(roots), bool(lead > 0) == (len(roots) % 2 == 0)
+    )
+    holding = [(low, high) for low, high in between if not (x < roots[low].place.real or x > roots[high].place.real)]
+    low, high = the_only(holding)
+    return roots[low], roots[high]
 
 
 # Steklov's motions: r on axis 1, any moments of inertia, M·γ = 0, Ω2² and Ω3² quadratic in Ω1.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Sequence
 from decimal import ROUND_CEILING, ROUND_HALF_EVEN, Decimal
 from fractions import Fraction
 from functools import wraps
@@ -82,7 +82,7 @@ def exponent(value: Fraction) -> int:
 
 
 P = ParamSpec("P")
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 
 _DEFAULTS = 53, 10
 """FLINT's own precision and length: what an outermost block that does not set both finds, whatever the user's are."""
@@ -250,7 +250,7 @@ class series_length(_Block):  # noqa: N801 - reads as a verb
         self.precision, self.length = None, length
 
 
-def whole_evaluation(function: Callable[P, Found]) -> Callable[P, Found]:
+def whole_evaluation(function: Callable[P, Result]) -> Callable[P, Result]:
     """``function`` with the context for itself from beginning to end, and again where another thread changed it.
 
     function: evaluates balls; gives the same when it is called again, and calls nothing of the user's.
@@ -258,7 +258,7 @@ def whole_evaluation(function: Callable[P, Found]) -> Callable[P, Found]:
     """
 
     @wraps(function)
-    def alone(*args: P.args, **kwargs: P.kwargs) -> Found:
+    def alone(*args: P.args, **kwargs: P.kwargs) -> Result:
         me = get_ident()
         if _held.thread == me:
             return function(*args, **kwargs)
@@ -376,6 +376,13 @@ _SERIES_DIVISION = ("leading term in denominator is not nonzero", "quotient woul
 
 class Undecided(ArithmeticError):
     """The working precision does not decide a discrete question."""
+
+
+def the_only(candidates: Sequence[Result]) -> Result:
+    """The one candidate that balls do not exclude; raises Undecided where none or several are left."""
+    if len(candidates) != 1:
+        raise Undecided
+    return candidates[0]
 
 
 def rational(value: Fraction | int) -> fmpq:

@@ -284,6 +284,19 @@ def ordered(roots: Sequence[acb]) -> list[int]:
     return real
 
 
+def alternate(real: Sequence[int], multiplicities: Sequence[int], positive: bool) -> list[tuple[int, int]]:
+    """Pairs of successive real roots between which a polynomial is positive.
+
+    real: their numbers, rising.  multiplicities: of all roots, by number.  positive: whether it is below the lowest.
+    """
+    intervals = []
+    for low, high in pairwise(real):
+        positive ^= multiplicities[low] % 2 == 1
+        if positive:
+            intervals.append((low, high))
+    return intervals
+
+
 def variable_between(ends: tuple[int, int], roots: Sequence[tuple[acb, int]], lead: arb, most: int) -> Variable:
     """The gap between two simple roots, or the way from a simple one to a double one and back; one at rest on a root.
 
