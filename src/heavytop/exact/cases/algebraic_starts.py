@@ -24,7 +24,7 @@ from heavytop.exact.cases.lagrange import polynomial
 from heavytop.exact.cases.one_interval import IntervalCurve, OneGapMotion, gaps, value
 from heavytop.exact.closed_form import cached_per_precision
 from heavytop.exact.flint.balls import BallLike, ball, exponent, midpoint, to_bits
-from heavytop.exact.separable.oscillation import Azimuth, Bearing, WithBearing
+from heavytop.exact.separable.oscillation import Bearing, WithBearing
 from heavytop.precision import Vector, decimal_text, round_to, shown
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -113,12 +113,7 @@ class AlgebraicMotion(WithBearing, Algebraic):
         """See :class:`heavytop.exact.separable.oscillation.WithBearing`: of M, and of what M/x tends to in
         Chaplygin's at rest.
         """
-        return _motion(self).bearing(_azimuth(self), ball(time))
-
-
-@cached_per_precision
-def _azimuth(motion: AlgebraicMotion) -> Azimuth:
-    return _motion(motion).azimuth()
+        return _motion(self).bearing(ball(time))
 
 
 @cached_per_precision

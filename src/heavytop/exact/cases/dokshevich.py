@@ -19,6 +19,7 @@ Source: A. I. Dokshevich (1966) has the frame; the formulas are derived here: th
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -28,7 +29,7 @@ from flint import acb, arb
 
 from heavytop.errors import InputError, prefixed
 from heavytop.exact.cases.algebraic_starts import Algebraic
-from heavytop.exact.closed_form import ClosedForm, cached_per_precision, once, sign, solved
+from heavytop.exact.closed_form import ClosedForm, balls, cached_per_precision, once, sign, solved
 from heavytop.exact.flint.balls import (
     BallLike,
     Balls,
@@ -94,6 +95,11 @@ class _Constants:
         """K."""
         return self.second - self.slope - 1 / self.b
 
+    def ends(self) -> tuple[arb, arb]:
+        """The range of v; the product of both squares is −1/C2, so that neither cancels."""
+        larger = self.middle / 2 + (self.middle * self.middle / 4 + self.lead).sqrt()
+        return (1 / larger).sqrt(), (larger / -self.lead).sqrt()
+
     def square(self, v: Any) -> Any:
         """z² at v, in units of B."""
         return self.lead * v * v + self.middle - 1 / (v * v)
@@ -106,15 +112,12 @@ class _Swing:
     """
 
     def __init__(self, constants: _Constants, v: arb, z: arb, side: int) -> None:
-        self.constants, self.side = constants, side
-        lead, middle = constants.lead, constants.middle
-        spread = (middle * middle / 4 + lead).sqrt()
-        # the product of both squares is −1/C2: neither cancels
-        low, high = (1 / (middle / 2 + spread)).sqrt(), ((middle / 2 + spread) / -lead).sqrt()
+        self.constants, self.side, self.made = constants, side, dict[Any, Any]()
+        low, high = constants.ends()
         if not (low.is_finite() and high.is_finite() and low < high):
             raise Undecided
         self.ends = [(acb(-low), 1), (acb(-high), 1)]
-        self.gap = Gap(low, high, Roots.of(-lead, self.ends), count=1, most=_TERMS)
+        self.gap = Gap(low, high, Roots.of(-constants.lead, self.ends), count=1, most=_TERMS)
         self.origin = self.gap.integrals(self.gap.phase(v, -z * v * self.gap.density(v)))[0]
 
     def phase(self, time: arb) -> tuple[arb, int]:
@@ -129,6 +132,7 @@ class _Swing:
         momentum = [x, c.slope * x + 1 / x, z]
         return momentum, [c.size * (c.first * v * v + 1 / c.b), c.size * (1 - c.second * v * v), c.size * x * z]
 
+    @cached_per_precision
     def azimuth(self) -> Azimuth:
         """That of M about γ."""
         c = self.constants
@@ -154,8 +158,9 @@ def sign_of(value: arb) -> int:
 
 @dataclass(frozen=True, slots=True)
 class _Frame:
-    """e1, e2, e3 and the units, as balls: columns of the rotation, β√B, √B, and β B/|n|."""
+    """I, then e1, e2, e3 and the units, as balls: columns of the rotation, β√B, √B, and β B/|n|."""
 
+    moments: list[arb]
     axes: tuple[tuple[arb, arb, arb], ...]
     rate: arb
     momentum: arb
@@ -166,37 +171,47 @@ class _Frame:
         return [sum((a * e[i] for a, e in zip(along, self.axes, strict=True)), arb(0)) for i in range(3)]
 
 
+def _axes(cosine: arb, sine: arb, side: arb) -> tuple[tuple[arb, arb, arb], ...]:
+    """e1, e2 and e3 with n along (cosine, 0, sine); side: ε of e3 = ε times axis 2."""
+    zero = arb(0)
+    return (cosine, zero, sine), (side * sine, zero, -side * cosine), (zero, side, zero)
+
+
 class _Moving(WithBearing):
-    """The base of the exact and the algebraic motions."""
+    """The base of the exact and the algebraic motions, with what both bring."""
 
     __slots__ = ()
 
+    @abstractmethod
+    def rate_square(self) -> Fraction:
+        """β² B."""
+
+    @abstractmethod
+    def swing(self) -> _Swing:
+        """The motion in x at the working precision."""
+
+    @abstractmethod
+    def frame(self) -> _Frame:
+        """The axes and units at the working precision."""
+
     def evaluate(self, time: Fraction) -> list[BallLike]:
-        swing, frame = _swing(self), _frame(self)
+        swing, frame = self.swing(), self.frame()
         gap, (start, _) = swing.gap, swing.phase(frame.rate * ball(time))
         (phase,) = solved([start], lambda now: [frame.rate / gap.density(gap.position(now[0]))])
         momentum, up = swing.state(phase)
-        body, gamma = frame.body(momentum), frame.body(up)
-        moments = map(ball, _data(self)[0])
-        return [
-            *(m * frame.momentum / moment for m, moment in zip(body, moments, strict=True)),
-            *(g * frame.gamma for g in gamma),
-        ]
+        omega = zip(frame.body(momentum), frame.moments, strict=True)
+        return [*(m * frame.momentum / moment for m, moment in omega), *(g * frame.gamma for g in frame.body(up))]
 
     def bearing(self, time: Fraction) -> Bearing:
         """M, level, and its azimuth."""
-        swing, frame = _swing(self), _frame(self)
+        swing, frame = self.swing(), self.frame()
         phase, turns = swing.phase(frame.rate * ball(time))
         momentum, up = swing.state(phase)
-        return Bearing.of(frame.body(up), frame.body(momentum), _azimuth(self).at(phase, turns))
+        return Bearing.of(frame.body(up), frame.body(momentum), swing.azimuth().at(phase, turns))
 
     def own_time(self, time: Fraction) -> Fraction:
         """``time`` in units of about 1/(β√B)."""
-        return time * Fraction(2) ** (exponent(_data(self)[3]) // 2)
-
-
-Data = tuple[Vector, Fraction, _Constants, Fraction]
-"""(I1, I2, I3), n1²/|n|², the constants, and β² B: exact where S is rational, else the last two are not used."""
+        return time * Fraction(2) ** (exponent(self.rate_square()) // 2)
 
 
 def _numbers(top: HeavyTop) -> tuple[Fraction, Fraction, Fraction, Fraction, Fraction]:
@@ -272,48 +287,30 @@ class Dokshevich(_Moving, ClosedForm):
     def __post_init__(self) -> None:
         ClosedForm.__post_init__(self)
         # x may all but rest, and the Fourier series of the integral be too long
-        decide(lambda: _swing(self), "The range of M·r is a point", _LEAST)
+        decide(self.swing, "The range of M·r is a point", _LEAST)
 
+    @once
+    def components(self) -> tuple[Fraction, Fraction, Fraction]:
+        """B, and M·n and M·e3 at the start."""
+        return _components(self.top, self.start)
 
-@once
-def _all(motion: Dokshevich) -> tuple[Data, Fraction, Fraction, Fraction]:
-    """The data, and |n|², X = M·n and Z = M·e3 at the start."""
-    (square, skew, *_), (unit, x, z) = _numbers(motion.top), _components(motion.top, motion.start)
-    data = motion.top.inertia, motion.top.moment[0] ** 2 / square, _constants(motion.top), skew * skew * unit
-    return data, square, x, z
+    @once
+    def rate_square(self) -> Fraction:
+        return _numbers(self.top)[1] ** 2 * self.components()[0]
 
+    @cached_per_precision
+    def swing(self) -> _Swing:
+        (square, *_), (unit, x, z), c = _numbers(self.top), self.components(), _constants(self.top)
+        constants = _Constants(ball(c.a), ball(c.b), ball(c.root))
+        return _Swing(constants, ball(x * x / (square * unit)).sqrt(), ball(z) / ball(unit).sqrt(), sign(x))
 
-def _data(motion: Any) -> Data:
-    data: Data = motion.data if isinstance(motion, AlgebraicDokshevich) else _all(motion)[0]
-    return data
-
-
-@cached_per_precision
-def _swing(motion: Any) -> _Swing:
-    if isinstance(motion, AlgebraicDokshevich):
-        return motion.swing()
-    (_, _, c, scale), square, x, z = _all(motion)
-    _, skew, *_ = _numbers(motion.top)
-    unit = scale / skew**2
-    balls = _Constants(ball(c.a), ball(c.b), ball(c.root))
-    return _Swing(balls, ball(x * x / (square * unit)).sqrt(), ball(z) / ball(unit).sqrt(), sign(x))
-
-
-@cached_per_precision
-def _frame(motion: Any) -> _Frame:
-    if isinstance(motion, AlgebraicDokshevich):
-        return motion.frame()
-    square, skew, _, _, turned = _numbers(motion.top)
-    size, n = ball(square).sqrt(), [ball(part) for part in motion.top.moment]
-    unit = ball(_data(motion)[3] / skew**2)
-    zero, up = arb(0), ball(turned)
-    axes = ((n[0] / size, zero, n[2] / size), (up * n[2] / size, zero, -up * n[0] / size), (zero, up, zero))
-    return _Frame(axes, ball(skew) * unit.sqrt(), unit.sqrt(), ball(skew) * unit / size)
-
-
-@cached_per_precision
-def _azimuth(motion: Any) -> Azimuth:
-    return _swing(motion).azimuth()
+    @cached_per_precision
+    def frame(self) -> _Frame:
+        square, beta, _, _, turned = _numbers(self.top)
+        size, skew, unit = ball(square).sqrt(), ball(beta), ball(self.components()[0])
+        n1, _, n3 = (ball(part) / size for part in self.top.moment)
+        axes = _axes(n1, n3, ball(turned))
+        return _Frame(balls(self.top.inertia), axes, skew * unit.sqrt(), unit.sqrt(), skew * unit / size)
 
 
 @dataclass(frozen=True, slots=True)
@@ -341,32 +338,32 @@ class AlgebraicDokshevich(_Moving, Algebraic):
             raise InputError(f"place = {shown(self.place)}.", "Give a number between 0 and 1, or its negative.")
 
     @property
-    def data(self) -> Data:
-        """See :data:`Data`; β² alone in place of β² B."""
+    def share(self) -> Fraction:
+        """n1²/|n|²."""
         i1, i2, i3 = self.inertia
-        first = i3 * (i1 - i2) / (i3 * (i1 - i2) + i1 * (i2 - i3))
-        return self.inertia, first, _Constants(0, 0, 0), first * (1 - first) * (1 / i1 - 1 / i3) ** 2
+        return i3 * (i1 - i2) / (i3 * (i1 - i2) + i1 * (i2 - i3))
 
+    def rate_square(self) -> Fraction:
+        i1, _, i3 = self.inertia
+        return self.share * (1 - self.share) * (1 / i1 - 1 / i3) ** 2
+
+    @cached_per_precision
     def frame(self) -> _Frame:
-        """At the working precision."""
-        (i1, _, i3), first, _, square = self.data
-        skew, cosine, sine = ball(square).sqrt(), ball(first).sqrt(), ball(1 - first).sqrt()
-        zero, up = arb(0), ball(Fraction(sign(1 / i1 - 1 / i3)))
-        axes = ((cosine, zero, sine), (up * sine, zero, -up * cosine), (zero, up, zero))
-        c = self._constants()
-        return _Frame(axes, skew, arb(1), c.b / c.size)
+        (i1, _, i3), c = self.inertia, self._constants()
+        up = ball(Fraction(sign(1 / i1 - 1 / i3)))
+        axes = _axes(ball(self.share).sqrt(), ball(1 - self.share).sqrt(), up)
+        return _Frame(balls(self.inertia), axes, ball(self.rate_square()).sqrt(), arb(1), c.b / c.size)
 
     def _constants(self) -> _Constants:
-        (i1, i2, i3), first, _, square = self.data
-        skew = ball(square).sqrt()
+        (i1, i2, i3), first = self.inertia, self.share
+        skew = ball(self.rate_square()).sqrt()
         a, b = ball(first / i1 + (1 - first) / i3) / skew, ball(1 / i2) / skew
         return _Constants(a, b, (a * a - a * b + b * b + 3).sqrt())
 
+    @cached_per_precision
     def swing(self) -> _Swing:
-        """At the working precision."""
         c = self._constants()
-        half = c.middle / 2 + (c.middle * c.middle / 4 + c.lead).sqrt()
-        low, high = (1 / half).sqrt(), (half / -c.lead).sqrt()
+        low, high = c.ends()
         v = low + (high - low) * ball(abs(self.place))
         return _Swing(c, v, c.square(v).sqrt(), sign(self.place))
 
@@ -374,7 +371,7 @@ class AlgebraicDokshevich(_Moving, Algebraic):
         """P r = |n| e1 with |n| = β κ/b, with at least so many bits."""
 
         def evaluate(_working: int) -> list[arb]:
-            frame, c = _frame(self), self._constants()
+            frame, c = self.frame(), self._constants()
             return [part * frame.rate * c.size / c.b for part in frame.axes[0]]
 
         return to_bits(evaluate, bits)

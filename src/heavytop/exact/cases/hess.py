@@ -25,7 +25,7 @@ Source: W. Hess, Math. Ann. 37 (1890) 153; P. A. Nekrasov, Mat. sbornik 16 (1892
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
@@ -175,12 +175,7 @@ class Hess(WithBearing, ClosedForm):
 
     def bearing(self, time: Fraction) -> Bearing:
         motion = _motion(self)
-        return motion.bearing(_azimuth(self), ball(motion.level.rate * time))
-
-
-@cached_per_precision
-def _azimuth(case: Hess) -> Azimuth:
-    return _motion(case).azimuth()
+        return motion.bearing(ball(motion.level.rate * time))
 
 
 @cached_per_precision
@@ -211,6 +206,7 @@ class HessMotion:
     linear: System2
     matrix: Transfer
     spinor: arb_mat
+    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @classmethod
     def of(cls, level: HessLevel) -> HessMotion:
@@ -242,6 +238,7 @@ class HessMotion:
         scale = arb(2) ** -_exponent(abs(u) + abs(v))
         return self._state(*solved((phase, u * scale, v * scale), self._rates))
 
+    @cached_per_precision
     def azimuth(self) -> Azimuth:
         """That of n about γ: Λ' = C0 |γ| N²/(N²|γ|² − s²)."""
         low, high, top = self.level.roots()
@@ -250,10 +247,10 @@ class HessMotion:
         gap = Gap(low, high, Roots.of(arb(2), [(acb(top), 1), (acb(pole), 2), (acb(-pole), 2)]), count=1)
         return Azimuth(gap, (self.area * gamma * self.size**2,))
 
-    def bearing(self, azimuth: Azimuth, time: arb) -> Bearing:
+    def bearing(self, time: arb) -> Bearing:
         """n, level, and its azimuth at ``time``."""
         phase, turns = phase_at(self.gap, self.origin + time)
-        return Bearing.of(self.at(time)[3:], [ball(n) for n in self.level.moment], azimuth.at(phase, turns))
+        return Bearing.of(self.at(time)[3:], [ball(n) for n in self.level.moment], self.azimuth().at(phase, turns))
 
     def _rates(self, now: Sequence[Any]) -> list[Any]:
         """θ', u' and v'."""

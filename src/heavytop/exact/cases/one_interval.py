@@ -19,7 +19,7 @@ turning points are points like any other. The four motions of this form: Steklov
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import pairwise
 from typing import Any
@@ -147,6 +147,7 @@ class OneGapMotion:
     others: tuple[_End, ...]
     origin: arb
     signs: tuple[int, int]
+    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @classmethod
     def of(cls, curve: IntervalCurve, x: Fraction, signs: tuple[int, int], most: int = MOST_TERMS) -> OneGapMotion:
@@ -184,6 +185,7 @@ class OneGapMotion:
         (moving,) = solved([phase], lambda now: [1 / self.gap.density(self.gap.position(now[0]))])
         return self._state(moving, turns)
 
+    @cached_per_precision
     def azimuth(self) -> Azimuth:
         """That of the level part of M about γ; see :meth:`Curve.turning`."""
         numerator, denominator = self.curve.turning()
@@ -195,14 +197,14 @@ class OneGapMotion:
         weights = [ball(self.curve.gamma_square()).sqrt() * arb(c) for c in numerator.coeffs()]
         return Azimuth(Gap(low, high, roots, count=len(weights)), tuple(weights))
 
-    def bearing(self, azimuth: Azimuth, time: arb) -> Bearing:
+    def bearing(self, time: arb) -> Bearing:
         """M/w, level, and its azimuth at ``time``."""
         phase, turns = phase_at(self.gap, self.origin + time)
         x, (q, r) = self.gap.position(phase), self._square_roots(phase, turns)
         s, t, u = (horner(height, x) for height in self.curve.heights)
         a, b, c = map(ball, self.curve.inertia)
         vector = [a * x ** (self.curve.power - self.curve.power // 2), b * q, c * r]
-        return Bearing.of([s, q * t, r * u], vector, azimuth.at(phase, turns))
+        return Bearing.of([s, q * t, r * u], vector, self.azimuth().at(phase, turns))
 
     def _square_roots(self, phase: Balls, turns: int) -> tuple[Balls, Balls]:
         """√Q and √R."""
@@ -326,12 +328,7 @@ class Steklov(WithBearing, ClosedForm):
 
     def bearing(self, time: Fraction) -> Bearing:
         rate, _ = _units(self.top, self.start)
-        return _motion(self).bearing(_azimuth(self), ball(rate * time))
-
-
-@cached_per_precision
-def _azimuth(case: Steklov) -> Azimuth:
-    return _motion(case).azimuth()
+        return _motion(self).bearing(ball(rate * time))
 
 
 @cached_per_precision
