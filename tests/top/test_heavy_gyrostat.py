@@ -16,7 +16,7 @@ from heavytop.top.equations import (
     HEAVY_GYROSTAT,
     HEAVY_TOP,
     Parameters,
-    area_with_rotor,
+    area,
     gyrostat,
     heavy_gyrostat,
     heavy_top,
@@ -100,9 +100,9 @@ def test_sretenskys_integral_changes_in_proportion_to_the_area_and_is_offered_on
         k = axes[2]
         i, j = (k + 1) % 3, (k + 2) % 3
         change = rate_of(sretensky(p.mapped(rational), Y, (i, j, k)), p)
-        area = area_with_rotor(p.mapped(rational), Y)
+        about_gamma = area(p.mapped(rational), Y)
         n = p.mapped(rational).moment
-        assert change == (n[j] * Y[i] - n[i] * Y[j]) * area / (4 * rational(i3 * i3))
+        assert change == (n[j] * Y[i] - n[i] * Y[j]) * about_gamma / (4 * rational(i3 * i3))
         assert "sretensky" not in {each.name for each in holding(top, start, HEAVY_GYROSTAT)}
         off = dot(top.angular_momentum(start.omega), gamma)
         omega = [w - off * g / m for w, g, m in zip(start.omega, gamma, top.inertia, strict=True)]
@@ -171,7 +171,7 @@ def test_the_gyrostat_is_its_case_with_a_rotor_along_axis_2_and_no_weight() -> N
         moved = (y[0], y[1] + turning, *y[2:])
         assert gyrostat(there, y) == heavy_gyrostat(here, moved)
         assert GYROSTAT.angular_velocity(there, y) == HEAVY_GYROSTAT.angular_velocity(here, moved)
-        assert dot([i * w for i, w in zip(inertia, y, strict=False)], y[3:]) == area_with_rotor(here, moved)
+        assert dot([i * w for i, w in zip(inertia, y, strict=False)], y[3:]) == area(here, moved)
 
 
 def test_a_motion_on_renamed_axes_is_the_renamed_motion() -> None:

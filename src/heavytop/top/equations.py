@@ -291,7 +291,15 @@ class Integral:
 
 
 def momentum(p: Parameters, y: Sequence[Scalar]) -> tuple[Scalar, Scalar, Scalar]:
-    """M = I Ω; of a full tensor where the moments are its three rows."""
+    """M = I Ω, and + k of `heavy_gyrostat`."""
+    first, second, third = momentum_of_body(p, y)
+    if not isinstance(p.rotor, tuple):
+        return first, second, third
+    return first + p.rotor[0], second + p.rotor[1], third + p.rotor[2]
+
+
+def momentum_of_body(p: Parameters, y: Sequence[Scalar]) -> tuple[Scalar, Scalar, Scalar]:
+    """I Ω; of a full tensor where the moments are its three rows."""
     if isinstance(p.inertia[0], tuple):
         return dot(p.inertia[0], y[:3]), dot(p.inertia[1], y[:3]), dot(p.inertia[2], y[:3])
     return p.inertia[0] * y[0], p.inertia[1] * y[1], p.inertia[2] * y[2]
@@ -308,12 +316,12 @@ def area(p: Parameters, y: Sequence[Scalar]) -> Scalar:
 
 
 def energy(p: Parameters, y: Sequence[Scalar]) -> Any:
-    """C1 = ½ Ω·M + P r·γ, the third of (1.3)."""
-    return dot(momentum(p, y), y[:3]) / 2 + dot(p.moment, y[3:6])
+    """C1 = ½ Ω·IΩ + P r·γ, the third of (1.3)."""
+    return dot(momentum_of_body(p, y), y[:3]) / 2 + dot(p.moment, y[3:6])
 
 
 def momentum_squared(p: Parameters, y: Sequence[Scalar]) -> Scalar:
-    """|M|²: Euler's top (P r = 0), and the gyrostat."""
+    """|M|²: Euler's top (P r = 0), and the gyrostats without weight."""
     m = momentum(p, y)
     return dot(m, m)
 
@@ -358,25 +366,8 @@ def hess(p: Parameters, y: Sequence[Scalar], axes: Axes) -> Any:
 
 
 def moment_along_centre(p: Parameters, y: Sequence[Scalar]) -> Any:
-    """M·r (times P) of a top with I1 = I2 = I3."""
-    return dot(momentum(p, y), p.moment)
-
-
-def momentum_with_rotor(p: Parameters, y: Sequence[Scalar]) -> tuple[Scalar, Scalar, Scalar]:
-    """M = I Ω + k of `heavy_gyrostat`."""
-    first, second, third = momentum(p, y)
-    return first + p.rotor[0], second + p.rotor[1], third + p.rotor[2]
-
-
-def area_with_rotor(p: Parameters, y: Sequence[Scalar]) -> Scalar:
-    """M·γ with M = I Ω + k."""
-    return dot(momentum_with_rotor(p, y), y[3:6])
-
-
-def momentum_with_rotor_squared(p: Parameters, y: Sequence[Scalar]) -> Scalar:
-    """|M|² with M = I Ω + k: P r = 0, the gyrostat of Zhukovsky and Volterra."""
-    m = momentum_with_rotor(p, y)
-    return dot(m, m)
+    """IΩ·r (times P) of a top with I1 = I2 = I3."""
+    return dot(momentum_of_body(p, y), p.moment)
 
 
 def _equatorial_square(y: Sequence[Scalar], axes: Axes) -> Scalar:
@@ -438,11 +429,9 @@ def holding(top: HeavyTop, start: State, system: System | None = None) -> tuple[
     system = system or system_of(None, top)
     if system is GYROSTAT:
         return (square, Integral("area", area), *_of_gyrostat(top))
-    with_rotor = system is HEAVY_GYROSTAT
-    about_gamma = Integral("area", area_with_rotor if with_rotor else area)
-    more = _of_heavy_gyrostat if with_rotor else _of_heavy_top
+    more = _of_heavy_gyrostat if system is HEAVY_GYROSTAT else _of_heavy_top
     p = system.parameters(top, start)
-    return (square, about_gamma, Integral("energy", energy), *more(p, start.flat))
+    return (square, Integral("area", area), Integral("energy", energy), *more(p, start.flat))
 
 
 def _of_gyrostat(top: HeavyTop) -> Iterator[Integral]:
@@ -478,7 +467,7 @@ def _of_heavy_top(p: Parameters, y: tuple[Fraction, ...]) -> Iterator[Integral]:
 def _of_heavy_gyrostat(p: Parameters, y: tuple[Fraction, ...]) -> Iterator[Integral]:
     n, rotor = p.moment, p.rotor
     if not any(n):
-        yield Integral("momentum_squared", momentum_with_rotor_squared)
+        yield Integral("momentum_squared", momentum_squared)
     if p.inertia[0] == p.inertia[1] == p.inertia[2] and any(n) and not any(cross(rotor, n)):
         yield Integral("moment_along_centre", moment_along_centre)
     for axes in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
@@ -492,7 +481,7 @@ def _of_heavy_gyrostat(p: Parameters, y: tuple[Fraction, ...]) -> Iterator[Integ
         if p.inertia[i] == 2 * p.inertia[k]:
             relation = partial(kovalevskaya_yehia, axes=axes)
             yield Integral("kovalevskaya_yehia", relation)
-        if p.inertia[i] == 4 * p.inertia[k] and area_with_rotor(p, y) == 0:
+        if p.inertia[i] == 4 * p.inertia[k] and area(p, y) == 0:
             yield Integral("sretensky", partial(sretensky, axes=axes))
 
 

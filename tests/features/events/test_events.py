@@ -430,6 +430,10 @@ def test_a_section_of_several_starts() -> None:
     assert "different levels" in repr(section)
     assert ht.poincare(TOP, START, 40, "gamma2").on_one_level
     assert len(ht.poincare(TOP, START, 10, "gamma2", digits=15).points()[0]) > 0
+    with_rotor = ht.HeavyTop(TOP.inertia, TOP.weight, TOP.centre, (1, 2, 3))
+    (area,) = ht.poincare(with_rotor, START, 1, "gamma2").areas
+    momentum = with_rotor.angular_momentum(START.omega)
+    assert area == float(sum(m * g for m, g in zip(momentum, START.gamma, strict=True)))
     with pytest.raises(InputError, match="no starts"):
         ht.poincare(TOP, [], 40)
     with pytest.raises(InputError, match=r"Start 1: .*zero along"):

@@ -34,7 +34,7 @@ from heavytop.features.claims.audit.context import (
 )
 from heavytop.features.claims.audit.judge import Progress, StatementVerdict, judge, silent, verdict_of
 from heavytop.features.claims.audit.user_claims import OFF_SPHERE, UserIntegral
-from heavytop.top.equations import HEAVY_GYROSTAT, System, area, area_with_rotor, energy
+from heavytop.top.equations import System, area, energy
 
 _OMEGA, _GAMMA = STATE[:3], STATE[3:]
 _ACROSS = _GAMMA[0] ** 2 + _GAMMA[1] ** 2
@@ -99,9 +99,8 @@ class UserComponent(UserIntegral):
         """First integrals less their values at the start."""
         if not self.start:
             return
-        about = self.about(None)
-        p = self.context.parameters(about)
-        standard = [energy(p, STATE), (area_with_rotor if about is HEAVY_GYROSTAT else area)(p, STATE)]
+        p = self.context.parameters(self.about(None))
+        standard = [energy(p, STATE), area(p, STATE)]
         own = [parse(text, self.context.names, "component.constants") for text in self._component.constants]
         for formula in (*map(symbol, standard), *own):
             yield replace(formula, expression=formula.expression - self._at_start(formula.expression))

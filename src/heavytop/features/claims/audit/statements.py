@@ -29,7 +29,6 @@ from heavytop.top.equations import (
     Parameters,
     System,
     area,
-    area_with_rotor,
     energy,
     gamma_squared,
     gyrostat_energy,
@@ -149,12 +148,12 @@ def of_matrix(rows: Rows, rate: Derivative) -> tuple[tuple[sympy.Expr, ...], Tri
 
 
 def _integral_statements(motion: ClaimedMotion, p: Parameters, system: System) -> Iterator[Statement]:
-    about_gamma, third = {
-        HEAVY_TOP.name: (area, (energy, "Omega.M/2 + P*r.gamma", "C1")),
-        GYROSTAT.name: (area, (gyrostat_energy, "Omega.M/2 + lambda*M2", "C1")),
-        HEAVY_GYROSTAT.name: (area_with_rotor, (energy, "Omega.(M - k)/2 + P*r.gamma", "C1")),
+    third = {
+        HEAVY_TOP.name: (energy, "Omega.M/2 + P*r.gamma", "C1"),
+        GYROSTAT.name: (gyrostat_energy, "Omega.M/2 + lambda*M2", "C1"),
+        HEAVY_GYROSTAT.name: (energy, "Omega.(M - k)/2 + P*r.gamma", "C1"),
     }[system.name]
-    known = (gamma_squared, "|gamma|^2", "1"), (about_gamma, "M.gamma", "C0"), third
+    known = (gamma_squared, "|gamma|^2", "1"), (area, "M.gamma", "C0"), third
     for component, (integral, left, right) in enumerate(known, 1):
         text = f"{left} = {right}"
         value = integral(p, motion.state)
