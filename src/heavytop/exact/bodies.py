@@ -114,12 +114,12 @@ class BodyMotion:
         if resolved.uncertainty is None:
             return _turned(known, bits, evaluate)
         parameters = self.system.parameters(resolved.top, resolved.start)
-        lost = log2(max(1.0, amplification(self.system, parameters, resolved.start.flat, time)))
-        data_bits = 64 * -(-(bits + _GUARD_BITS + int(2 * lost)) // 64)
+        loss_bits = log2(max(1.0, amplification(self.system, parameters, resolved.start.flat, time)))
+        data_bits = 64 * -(-(bits + _GUARD_BITS + int(2 * loss_bits)) // 64)
         try:
             return _turned(self._known(data_bits), bits, evaluate)
         except OutOfReach:
-            if lost > _FOLLOWED_BITS or 4 * data_bits > _MOST_BITS:
+            if loss_bits > _FOLLOWED_BITS or 4 * data_bits > _MOST_BITS:
                 raise
             return _turned(self._known(4 * data_bits), bits, evaluate)  # the amplification is an estimate
 

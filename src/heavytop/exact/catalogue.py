@@ -173,14 +173,14 @@ def state_and_attitude(
     """
     if isinstance(solution, Validated):
         return solution.method, solution.with_attitude
-    own: Attitude | None = getattr(solution, "own_attitude", getattr(solution, "attitude", None))
-    if own is not None:
-        turned = Turned(solution, own)
+    attitude: Attitude | None = getattr(solution, "own_attitude", getattr(solution, "attitude", None))
+    if attitude is not None:
+        from_initial_xi = Turned(solution, attitude)
         try:
-            turned(latest, bits)
+            from_initial_xi(latest, bits)
         except (NotInClass, OutOfReach):
             pass
         else:
-            return solution.method, turned
+            return solution.method, from_initial_xi
     enclosure = Validated(solution.top, solution.start, solution.system, effort=effort)
     return enclosure.method, lambda time, bits: [*solution.state(time, bits), *enclosure.attitude(time, bits)]

@@ -397,9 +397,9 @@ class Turned:
 def _turn(turned: Turned) -> tuple[arb, arb, arb]:
     """Cosine and sine of the turn from the own ξ(0), and |γ|: the same at every time."""
     gamma = turned.solution.start.gamma
-    wanted, began = initial_xi(gamma), turned.own(Fraction(0), current_precision())
+    xi, own_xi = initial_xi(gamma), turned.own(Fraction(0), current_precision())
     length = ball(dot(gamma, gamma)).sqrt()
-    return dot(wanted, began), dot(wanted, cross([ball(g) / length for g in gamma], began)), length
+    return dot(xi, own_xi), dot(xi, cross([ball(g) / length for g in gamma], own_xi)), length
 
 
 def starting_at(xi: Vector, gamma: Vector, known: Attitude) -> Attitude:
@@ -482,8 +482,8 @@ class Renamed:
     @property
     def method(self) -> str:
         """The solution's own, and the names its axes have here."""
-        there = inverse(self.axes)
-        return f"{self.solution.method}, axes renamed {there[0] + 1}, {there[1] + 1}, {there[2] + 1}"
+        axes = inverse(self.axes)
+        return f"{self.solution.method}, axes renamed {axes[0] + 1}, {axes[1] + 1}, {axes[2] + 1}"
 
     @property
     def source(self) -> str:

@@ -74,12 +74,12 @@ def resolve(body: Body | HeavyTop, start: State, bits: int = 256) -> Resolved:
     bits: to which what is irrational is rounded: a tensor relative to its smallest moment, the rest to the largest of
     its kind.
     """
-    spin, rows, off = _start(start, bits)
+    spin, rows, errors = _start(start, bits)
     up = rows[2] if rows is not None else start.gamma
     if isinstance(body, HeavyTop):
-        return _resolved(body, IDENTITY, None, (spin, up, rows), off, bits)
+        return _resolved(body, IDENTITY, None, (spin, up, rows), errors, bits)
     principal = body.principal(bits)
-    return _resolved(body.top_in(principal), principal.axes, (body, principal), (spin, up, rows), off, bits)
+    return _resolved(body.top_in(principal), principal.axes, (body, principal), (spin, up, rows), errors, bits)
 
 
 def _start(start: State, bits: int) -> tuple[Vector, tuple[Vector, Vector, Vector] | None, tuple[Fraction, Fraction]]:
@@ -87,22 +87,22 @@ def _start(start: State, bits: int) -> tuple[Vector, tuple[Vector, Vector, Vecto
     attitude = start.attitude
     if attitude is None:
         return start.omega, None, (Fraction(0), Fraction(0))
-    known = attitude.exact_rows()
-    rows, off = (known, Fraction(0)) if known else _near(attitude, bits)
+    exact = attitude.exact_rows()
+    rows, error = (exact, Fraction(0)) if exact else _near(attitude, bits)
     if start.omega_space is None:
-        return start.omega, rows, (Fraction(0), off)
-    turned = rotated(transposed(rows), start.omega_space)
-    return turned, rows, (off * sum(map(abs, start.omega_space), Fraction(0)), off)
+        return start.omega, rows, (Fraction(0), error)
+    omega = rotated(transposed(rows), start.omega_space)
+    return omega, rows, (error * sum(map(abs, start.omega_space), Fraction(0)), error)
 
 
 def _near(attitude: Attitude, bits: int) -> tuple[tuple[Vector, Vector, Vector], Fraction]:
     """A rational rotation, and how far its entries are off: about 2^-bits, of large angles by more working bits."""
     for more in _MORE_BITS:
         rows = attitude.rational_rows(bits + more)
-        off = _distance(attitude, rows, bits + more)
-        if off * 2**bits <= _NEAR:
+        error = _distance(attitude, rows, bits + more)
+        if error * 2**bits <= _NEAR:
             break
-    return rows, off
+    return rows, error
 
 
 @whole_evaluation
@@ -119,7 +119,7 @@ def _resolved(
     axes: tuple[Vector, Vector, Vector],
     body_and_axes: tuple[Body, PrincipalAxes] | None,
     start: tuple[Vector, Vector, Any],
-    off: tuple[Fraction, Fraction],
+    start_errors: tuple[Fraction, Fraction],
     bits: int,
 ) -> Resolved:
     spin, up, rows = start
@@ -127,7 +127,7 @@ def _resolved(
     unit = dot(up, up) == 1
     xi = rows[0] if rows is not None else perpendicular(up) if unit else None
     exact = body_and_axes is None or body_and_axes[1].exact
-    if exact and not any(off):
+    if exact and not any(start_errors):
         state = State(rotated(back, spin), rotated(back, up))
         return Resolved(top, state, None if xi is None else rotated(back, xi), axes, None)
     # short numbers in place of long ones, where they are not exact anyway
@@ -136,10 +136,10 @@ def _resolved(
     rounded, lacks = (top, None) if exact else _rounded_top(top, bits)
     rate = Fraction(0)
     if body_and_axes is not None and not exact:
-        fastest = _root(dot(spin, spin)) + 2 * (off[0] + speed)
+        fastest = _root(dot(spin, spin)) + 2 * (start_errors[0] + speed)
         rate = _field_error(body_and_axes, rounded, lacks, fastest)
     # a vector turned by A moves by at most √3 times the largest of its components
-    errors = (*[2 * off[0] + speed] * 3, *[2 * off[1] + rounding] * 6)
+    errors = (*[2 * start_errors[0] + speed] * 3, *[2 * start_errors[1] + rounding] * 6)
     state = State(omega, rotated(back, up))
     return Resolved(rounded, state, None if xi is None else rotated(back, xi), axes, Uncertainty(errors, rate))
 
@@ -156,8 +156,8 @@ def _rounded_top(top: HeavyTop, bits: int) -> tuple[HeavyTop, tuple[Vector, Vect
     rotor = None if top.rotor is None else tuple(round_to(value, bits) for value in top.rotor)
     short = HeavyTop(top.inertia, top.weight, centre, rotor, top.mass)
     missing = [
-        tuple(a - b for a, b in zip(one or (Fraction(0),) * 3, other or (Fraction(0),) * 3, strict=True))
-        for one, other in ((top.moment, short.moment), (top.rotor, short.rotor))
+        tuple(a - b for a, b in zip(exact or (Fraction(0),) * 3, rounded or (Fraction(0),) * 3, strict=True))
+        for exact, rounded in ((top.moment, short.moment), (top.rotor, short.rotor))
     ]
     return short, (missing[0], missing[1])  # type: ignore[return-value]
 
@@ -167,19 +167,20 @@ def _field_error(
 ) -> Fraction:
     """A bound of every component of δ: see the head of this file.  Norms are Frobenius' and Euclid's, rounded up."""
     body, principal = body_and_axes
-    rest = _root(sum(value * value for row in principal.left for value in row))
+    beyond = _root(sum(value * value for row in principal.left for value in row))
     tensor = _root(sum(value * value for row in body.tensor for value in row))
-    none = (Fraction(0), Fraction(0), Fraction(0))
-    rotor = body.rotor or none
+    zero = (Fraction(0), Fraction(0), Fraction(0))
+    rotor = body.rotor or zero
     pull, whirl = _root(dot(body.moment, body.moment)), _root(dot(rotor, rotor))
-    short, slow = (_root(dot(vector, vector)) for vector in lacks or (none, none))
+    pull_error, whirl_error = (_root(dot(vector, vector)) for vector in lacks or (zero, zero))
     # |D⁻¹| and |X| as norms of matrices; |γ| is 1 within _MARGIN
-    least = min(principal.moments) - rest
-    inverse = 1 / least
-    square = 2 * (tensor * start_speed**2 / 2 + (2 + _MARGIN) * pull) / least
+    smallest = min(principal.moments) - beyond
+    inverse = 1 / smallest
+    square = 2 * (tensor * start_speed**2 / 2 + (2 + _MARGIN) * pull) / smallest
     fastest = _root(square)
     torque = (tensor * fastest + whirl) * fastest + (1 + _MARGIN) * pull
-    return inverse**2 * rest * torque + inverse * ((rest * fastest + slow) * fastest + (1 + _MARGIN) * short)
+    missing = (beyond * fastest + whirl_error) * fastest + (1 + _MARGIN) * pull_error
+    return inverse**2 * beyond * torque + inverse * missing
 
 
 def _root(square: Any) -> Fraction:

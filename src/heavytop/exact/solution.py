@@ -112,10 +112,10 @@ def require(name: str, conditions: Iterable[ExactRelation], top: HeavyTop, start
             )
 
 
-def apart(known: ExactSolution, top: HeavyTop, start: State) -> list[Fraction]:
+def apart(motion: ExactSolution, top: HeavyTop, start: State) -> list[Fraction]:
     """The top and start of a known motion less these, number by number."""
-    one, other = ((*t.inertia, t.weight, *t.centre, *s.flat) for t, s in ((known.top, known.start), (top, start)))
-    return [a - b for a, b in zip(one, other, strict=True)]
+    known, given = ((*t.inertia, t.weight, *t.centre, *s.flat) for t, s in ((motion.top, motion.start), (top, start)))
+    return [a - b for a, b in zip(known, given, strict=True)]
 
 
 def _hess(top: HeavyTop, _start: State) -> tuple[Fraction]:
@@ -140,8 +140,8 @@ def equilibrium(system: System) -> ExactRelation:
     )
 
 
-def _differ(top: HeavyTop, one: int, other: int) -> Fraction:
-    return top.inertia[one] - top.inertia[other]
+def _differ(top: HeavyTop, i: int, j: int) -> Fraction:
+    return top.inertia[i] - top.inertia[j]
 
 
 def _area(top: HeavyTop, start: State) -> tuple[Fraction]:

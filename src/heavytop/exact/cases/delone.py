@@ -110,10 +110,10 @@ class DeloneAzimuth:
         if level.area == 0:
             return cls(level, gap, gap.integrals(phase)[0], None)
         low, high = gap.middle - gap.reach, gap.middle + gap.reach
-        beside = Gap(low, high, gap.rest.with_line(offset), count=2, most=MOST_TERMS)
+        with_pole = Gap(low, high, gap.rest.with_line(offset), count=2, most=MOST_TERMS)
         side = -1 if offset * gap.middle > 1 else 1
         weight = side * ball(e) * along_gamma(level) / 2
-        return cls(level, gap, gap.integrals(phase)[0], Azimuth(beside, (arb(0), weight)))
+        return cls(level, gap, gap.integrals(phase)[0], Azimuth(with_pole, (arb(0), weight)))
 
     def bearing(self, time: Fraction, state: Sequence[arb]) -> Bearing:
         """v in the top's own axes, and Λ; state: Ω and γ at ``time``."""

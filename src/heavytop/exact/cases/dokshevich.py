@@ -136,17 +136,17 @@ class _Swing:
     def azimuth(self) -> Azimuth:
         """That of M about γ."""
         c = self.constants
-        lead, rest = 1 + c.slope * c.slope + c.lead, 2 * c.slope + c.middle
+        lead, constant = 1 + c.slope * c.slope + c.lead, 2 * c.slope + c.middle
         roots, scale = list(self.ends), -c.lead
         if not lead.is_zero():
-            far = acb(-rest / lead).sqrt()
+            far = acb(-constant / lead).sqrt()
             if far.imag.contains(0) and far.real.contains(0):
                 raise Undecided
-            far = acb(0, far.imag) if rest / lead > 0 else acb(far.real)
+            far = acb(0, far.imag) if constant / lead > 0 else acb(far.real)
             roots, scale = [*roots, (far, 2), (-far, 2)], scale * lead * lead
         stops = self.gap.middle - self.gap.reach, self.gap.middle + self.gap.reach
         gap = Gap(*stops, Roots.of(scale, roots), count=2, most=_TERMS)
-        return Azimuth(gap, (arb(0), self.side * sign_of(lead * self.gap.middle**2 + rest) * c.size / c.b))
+        return Azimuth(gap, (arb(0), self.side * sign_of(lead * self.gap.middle**2 + constant) * c.size / c.b))
 
 
 def sign_of(value: arb) -> int:
@@ -237,22 +237,22 @@ def _constants(top: HeavyTop) -> _Constants:
 
 def _components(top: HeavyTop, start: State) -> tuple[Fraction, Fraction, Fraction]:
     """B, and M·n and M·e3 at the start."""
-    square, _, _, _, turned = _numbers(top)
+    square, _, _, _, side = _numbers(top)
     momentum, n = top.angular_momentum(start.omega), top.moment
-    x, y, z = dot(momentum, n), turned * (momentum[0] * n[2] - momentum[2] * n[0]), turned * momentum[1]
+    x, y, z = dot(momentum, n), side * (momentum[0] * n[2] - momentum[2] * n[0]), side * momentum[1]
     return (x * y - _constants(top).slope * x * x) / square, x, z
 
 
 def _levels_off(top: HeavyTop, start: State) -> list[Fraction]:
     """The defects of z² and the three components of γ, in units of B."""
-    square, skew, _, b, turned = _numbers(top)
+    square, skew, _, b, side = _numbers(top)
     (unit, x, z), c, n, gamma = _components(top, start), _constants(top), top.moment, start.gamma
     v2 = x * x / (square * unit)
     return [
         z * z / unit - (c.lead * v2 + c.middle - 1 / v2),
         dot(gamma, n) / (skew * unit) - c.size * (c.first * v2 + 1 / b),
-        turned * (gamma[0] * n[2] - gamma[2] * n[0]) / (skew * unit) - c.size * (1 - c.second * v2),
-        turned * gamma[1] * square / skew - c.size * x * z,
+        side * (gamma[0] * n[2] - gamma[2] * n[0]) / (skew * unit) - c.size * (1 - c.second * v2),
+        side * gamma[1] * square / skew - c.size * x * z,
     ]
 
 
@@ -306,10 +306,10 @@ class Dokshevich(_Moving, ClosedForm):
 
     @cached_per_precision
     def frame(self) -> _Frame:
-        square, beta, _, _, turned = _numbers(self.top)
+        square, beta, _, _, side = _numbers(self.top)
         size, skew, unit = ball(square).sqrt(), ball(beta), ball(self.components()[0])
         n1, _, n3 = (ball(part) / size for part in self.top.moment)
-        axes = _axes(n1, n3, ball(turned))
+        axes = _axes(n1, n3, ball(side))
         return _Frame(balls(self.top.inertia), axes, skew * unit.sqrt(), unit.sqrt(), skew * unit / size)
 
 

@@ -105,11 +105,11 @@ class _Lattice:
         def carry(vector: Sequence[Any]) -> list[BallLike]:
             # what stays: the part along M, and the one across as a factor of the wave
             part, projection, across = (dot(vector, axis) for axis in self.frame)
-            turned = acb(projection, -across) * self.turn * turning
-            x, y = real(turned), imag(turned) / square
-            rest = part - x * along[b] / square
+            rotated = acb(projection, -across) * self.turn * turning
+            x, y = real(rotated), imag(rotated) / square
+            share = part - x * along[b] / square
             result = [x + part * along[b]] * 3
-            result[i], result[j] = along[i] * rest - along[j] * y, along[j] * rest + along[i] * y
+            result[i], result[j] = along[i] * share - along[j] * y, along[j] * share + along[i] * y
             return result
 
         return omega, carry

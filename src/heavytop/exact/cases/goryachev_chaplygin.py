@@ -82,8 +82,8 @@ class GoryachevLevel(Reduced):
     @property
     def third(self) -> Fraction:
         """G, Sretensky's integral: without a rotor Goryachev and Chaplygin's."""
-        one = Parameters((4, 4, 1), (*self.moment, 0), (0, 0, self.rotor))
-        return Fraction(sretensky(one, (*self.omega, *self.gamma), (0, 1, 2)))
+        parameters = Parameters((4, 4, 1), (*self.moment, 0), (0, 0, self.rotor))
+        return Fraction(sretensky(parameters, (*self.omega, *self.gamma), (0, 1, 2)))
 
     def sextic(self) -> fmpq_poly:
         """f."""
@@ -227,23 +227,23 @@ class GoryachevMotion:
 
         Raises Undecided where it does not suffice, OutOfReach where the Fourier series need too many terms.
         """
-        curve, places = roots(level), separated_start(level)
-        ends = gap_ends(level, curve, places)
+        curve, values = roots(level), separated_start(level)
+        ends = gap_ends(level, curve, values)
         branch = [(root.value, root.multiplicity) for root in curve]
         gaps = tuple(variable_between(pair, branch, arb(1) / 4, MOST_TERMS) for pair in ends)
         c, a = ball(level.moment_square).sqrt(), size_of(level)
-        turned = level.turned()
-        speeds = [c * (2 * turned[1] * turned[5] - turned[4] * u) for u in places]
+        start = level.turned()
+        speeds = [c * (2 * start[1] * start[5] - start[4] * u) for u in values]
         # du/dθ is −y1/√g1 and y2/√g2
-        slopes = -speeds[0] * gaps[0].density(places[0]), speeds[1] * gaps[1].density(places[1])
-        phases = [gap.phase(u, slope) for gap, u, slope in zip(gaps, places, slopes, strict=True)]
+        slopes = -speeds[0] * gaps[0].density(values[0]), speeds[1] * gaps[1].density(values[1])
+        phases = [gap.phase(u, slope) for gap, u, slope in zip(gaps, values, slopes, strict=True)]
         line = Line.of(gaps, (1, -1), (0, -1), phases)
         with series_length(1):
             possible = []
             for sign in (1, -1):
                 motion = cls(level, c, a, tuple(curve), tuple(ends), line, sign)
                 position = motion.turned([arb_series([phase], prec=1) for phase in phases], [0, 0])
-                if all(one[0].overlaps(other) for one, other in zip(position, turned, strict=True)):
+                if all(one[0].overlaps(other) for one, other in zip(position, start, strict=True)):
                     possible.append(motion)
         return the_only(possible)
 
@@ -291,14 +291,14 @@ class GoryachevMotion:
         at_end = dict(zip((low, high), gap.ends(phase), strict=True))
         half_periods = []
         for factor in (_MINUS, _PLUS):
-            value, rest = phase * 0 + 1, phase * 0 + arb(1) / 2
+            value, others = phase * 0 + 1, phase * 0 + arb(1) / 2
             for number, root in enumerate(self.curve):
                 if root.counts[factor] and number in at_end:
                     # no power: FLINT takes logarithms for that, of 0 at a turning point
                     value *= side * at_end[number] * (at_end[number] if root.counts[factor] > 1 else 1)
                 elif root.counts[factor]:
-                    rest *= _distance(u, root.value, root.counts[factor], gap.middle)
-            half_periods.append(value * rest.sqrt())
+                    others *= _distance(u, root.value, root.counts[factor], gap.middle)
+            half_periods.append(value * others.sqrt())
         # y_k = ±α_k β_k has the sign of −du/dθ
         return u, -half_periods[0] if constant(gap.bend(phase)) < 0 else half_periods[0], half_periods[1]
 
@@ -363,8 +363,8 @@ class Strip:
         """u stays nearer to where it is at Im s = 0 than _ROOM of the way to ``other``, the end of the other gap."""
         middle, alpha, beta, less, more, away = _sizes(motion, gap, other)
         room, twice = _ROOM / _ROUNDING * away, 2 * _ROUNDING * float(abs(motion.level.rotor))
-        off = [np.zeros(_CELLS)] * 3
-        scale, height, grown = alpha.max() + beta.max(), 0.0, off
+        distances = [np.zeros(_CELLS)] * 3
+        scale, height, grown = alpha.max() + beta.max(), 0.0, distances
 
         def rates(near: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
             a, b, c = near
@@ -372,15 +372,15 @@ class Strip:
             return [first * second, (less + excess) * second / 2, (more + excess) * first / 2]
 
         for _ in range(5 * _STEPS):
-            sizes = room, scale + off[1], scale + off[2]
+            sizes = room, scale + distances[1], scale + distances[2]
             # a step of the solution is below what no point of its own step leaves
-            wide = [x + size / _STEPS for x, size in zip(off, sizes, strict=True)]
+            wide = [x + size / _STEPS for x, size in zip(distances, sizes, strict=True)]
             slopes = rates(wide)
             step = min(float((size / slope).min()) for size, slope in zip(sizes, slopes, strict=True)) / _STEPS
-            off = [_ROUNDING * (x + step * slope) for x, slope in zip(off, slopes, strict=True)]
-            if (off[0] > room).any() or max(off[1].max(), off[2].max()) > _GROWTH * scale:
+            distances = [_ROUNDING * (x + step * slope) for x, slope in zip(distances, slopes, strict=True)]
+            if (distances[0] > room).any() or max(distances[1].max(), distances[2].max()) > _GROWTH * scale:
                 break
-            height, grown = height + step / _ROUNDING, off
+            height, grown = height + step / _ROUNDING, distances
         return cls(height, (float((alpha + grown[1]).max()), float((beta + grown[2]).max())))
 
 

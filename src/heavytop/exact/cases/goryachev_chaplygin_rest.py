@@ -134,12 +134,12 @@ def _speeds(level: GoryachevLevel) -> list[tuple[arb, arb]]:
 def _the_one(level: GoryachevLevel, possible: Sequence[Signed]) -> Signed:
     """The motion, of two that differ in σ, that starts as the level says; raises Undecided where balls do not tell."""
     with series_length(1):
-        turned = level.turned()
+        start = level.turned()
         return the_only(
             [
                 motion
                 for motion in possible
-                if all(a.overlaps(b) for a, b in zip(motion.state(arb(0)), turned, strict=True))
+                if all(a.overlaps(b) for a, b in zip(motion.state(arb(0)), start, strict=True))
             ]
         )
 
@@ -173,13 +173,13 @@ class RestMotion:
         # a − h or a + h, whichever cancels, from their product
         above, below = (a + h, room / (a + h)) if level.energy > 0 else (room / (a - h), a - h)
         functions = jacobi(above / (2 * a), below / (2 * a))
-        tilt, turned = speed / c, level.turned()
-        at_rest = cls(level, h, a, c, speed, tilt, turned[4], turned[5], (tilt, tilt), functions, arb(0))
+        tilt, start = speed / c, level.turned()
+        at_rest = cls(level, h, a, c, speed, tilt, start[4], start[5], (tilt, tilt), functions, arb(0))
         if not any(level.omega):
             # e − γ2 and e + γ2 of e² = γ2² + γ3², without cancellation
-            larger = tilt + abs(turned[4])
-            smaller = turned[5] * turned[5] / larger
-            return replace(at_rest, shares=(larger, smaller) if turned[4] < 0 else (smaller, larger))
+            larger = tilt + abs(start[4])
+            smaller = start[5] * start[5] / larger
+            return replace(at_rest, shares=(larger, smaller) if start[4] < 0 else (smaller, larger))
         tangents, origin = at_rest._passed(above, below)
         first, second = (2 * tilt * p / (tangents[0] + tangents[1]) for p in tangents)
         upright = (first * second).sqrt()
@@ -197,14 +197,14 @@ class RestMotion:
             delta = (below * above / scale).sqrt()
             if cosine > 0:
                 less, more = square / (1 + cosine), 1 + cosine
-                both = delta + cosine
+                sum_of_both = delta + cosine
             else:
                 less = 1 - cosine
                 more = square / less
-                both = below / (2 * self.size) * square / (delta - cosine)
+                sum_of_both = below / (2 * self.size) * square / (delta - cosine)
             tangents.append((less / more).sqrt())
             # half of F(φ|m) has sn² = (1 − cos φ)/(1 + Δ), Δ² = 1 − m sin²φ
-            origin += legendre_f(less / (1 + delta), both / (1 + delta), both / more)
+            origin += legendre_f(less / (1 + delta), sum_of_both / (1 + delta), sum_of_both / more)
         return tangents, origin
 
     def state(self, time: Balls) -> list[Balls]:
@@ -223,23 +223,23 @@ class RestMotion:
 
     def swept(self, end: arb) -> arb:
         """The integral of dΛ/dy from 0 to ``end``; raises OutOfReach where the quadrature takes too long."""
-        (one, two), cosine, sine = self.shares, self.energy / self.size, self.speed / self.size
+        (share1, share2), cosine, sine = self.shares, self.energy / self.size, self.speed / self.size
 
         def width(square: acb, analytic: bool) -> acb:
             return ((square - cosine) ** 2 + sine * sine).sqrt(analytic=analytic)
 
-        taken = count()
+        evaluations = count()
 
         def slope(y: acb, analytic: bool) -> acb:
-            if next(taken) > _MOST_VALUES:
+            if next(evaluations) > _MOST_VALUES:
                 return acb("nan")
-            w1, w2 = width(y * one * one, analytic), width(y * two * two, analytic)
-            return 1 / (w1.sqrt(analytic=analytic) * w2.sqrt(analytic=analytic) * (one * w2 + two * w1))
+            w1, w2 = width(y * share1 * share1, analytic), width(y * share2 * share2, analytic)
+            return 1 / (w1.sqrt(analytic=analytic) * w2.sqrt(analytic=analytic) * (share1 * w2 + share2 * w1))
 
         middle = acb(end.mid())
         # FLINT integrates to exact ends; the rest by the mean value theorem
         total = (acb(end) - middle) * slope(acb(end), False) + acb.integral(slope, acb(0), middle)
-        if next(taken) > _MOST_VALUES:
+        if next(evaluations) > _MOST_VALUES:
             raise OutOfReach(
                 f"The azimuth of M takes more than {_MOST_VALUES} values of its integrand: gamma at rest is all but "
                 "in line with the centre of mass, or all but level beside it.",
@@ -267,8 +267,8 @@ class PathPoint:
         return tangents, [self._width(p * p) for p in tangents], shares
 
     def _width(self, square: Balls) -> Balls:
-        off, sine = square - self.motion.energy / self.motion.size, self.motion.speed / self.motion.size
-        return (off * off + sine * sine).sqrt()
+        excess, sine = square - self.motion.energy / self.motion.size, self.motion.speed / self.motion.size
+        return (excess * excess + sine * sine).sqrt()
 
     def state(self) -> list[Any]:
         """The six components in the turned frame."""
@@ -292,19 +292,19 @@ class PathPoint:
         motion = self.motion
         (p1, p2), (w1, w2), shares = self._tangents()
         product, speed = w1 * w2, motion.speed
-        one, two = p1 * p1, p2 * p2
+        square1, square2 = p1 * p1, p2 * p2
         share = 4 * speed * motion.upright / (motion.size * self.root * product * product.sqrt())
         return [
-            -self.side * speed * share * (two - one),
-            share * (motion.size * (1 + one * two) - motion.energy * (one + two)),
+            -self.side * speed * share * (square2 - square1),
+            share * (motion.size * (1 + square1 * square2) - motion.energy * (square1 + square2)),
             (shares[0] / w1 - shares[1] / w2) * (2 * speed / self.root),
         ]
 
     def azimuth(self) -> arb:
         """Λ."""
         motion = self.motion
-        here = motion.swept(self.lift * self.lift)
-        return here if self.side > 0 else 2 * motion.swept(1 / (motion.upright * motion.upright)) - here
+        swept = motion.swept(self.lift * self.lift)
+        return swept if self.side > 0 else 2 * motion.swept(1 / (motion.upright * motion.upright)) - swept
 
 
 @dataclass(frozen=True, slots=True)
@@ -325,9 +325,9 @@ class UprightMotion:
     def of(cls, level: GoryachevLevel) -> UprightMotion:
         """At the working precision; raises Undecided where it does not suffice."""
         # sinh v = −2y/|u|³
-        one, two = (-2 * y / u**3 for u, y in _speeds(level))
-        c, total = ball(level.moment_square).sqrt(), one.asinh() + two.asinh()
-        return _the_one(level, [cls(level, size_of(level), c, total, one - two, sign) for sign in (1, -1)])
+        sinh1, sinh2 = (-2 * y / u**3 for u, y in _speeds(level))
+        c, total = ball(level.moment_square).sqrt(), sinh1.asinh() + sinh2.asinh()
+        return _the_one(level, [cls(level, size_of(level), c, total, sinh1 - sinh2, sign) for sign in (1, -1)])
 
     def state(self, time: Balls) -> list[Balls]:
         """The six components in the turned frame at a number or series."""
@@ -338,17 +338,17 @@ class UprightMotion:
         sine = self.difference / (up + down)
         cosine = (sine * sine + 1).sqrt()
         sinh, cosh = (up - down) / 2, (up + down) / 2
-        one, two = sinh * cosine + cosh * sine, sinh * cosine - cosh * sine
-        s1, s2 = (1 / (x * x + 1).sqrt() for x in (one, two))
+        sinh1, sinh2 = sinh * cosine + cosh * sine, sinh * cosine - cosh * sine
+        s1, s2 = (1 / (x * x + 1).sqrt() for x in (sinh1, sinh2))
         product = s1 * s2
         power, across = self.sign * product * product.sqrt(), 2 * a / (self.moment * (s1 + s2))
         return [
             -root * power * self.difference,
-            -root * power * (1 + one * two),
+            -root * power * (1 + sinh1 * sinh2),
             2 * root * (s1 - s2),
             (a - 2 * a * (s1 * s1 - product + s2 * s2)) / self.moment,
-            across * (s1**3 * one - s2**3 * two),
-            across * power * (one + two),
+            across * (s1**3 * sinh1 - s2**3 * sinh2),
+            across * power * (sinh1 + sinh2),
         ]
 
 

@@ -35,7 +35,7 @@ def _rates(top: HeavyTop, start: State) -> tuple[Fraction]:
 
 
 def _gamma_off(top: HeavyTop, start: State) -> list[Fraction]:
-    return [g - wanted for g, wanted in zip(start.gamma, gamma_of(top, start.omega), strict=True)]
+    return [g - component for g, component in zip(start.gamma, gamma_of(top, start.omega), strict=True)]
 
 
 @dataclass(frozen=True, slots=True)

@@ -168,10 +168,10 @@ def _prepared(motion: Gyrostat) -> _Prepared:
     prepared = motion.quartic().prepared()
     winding = Winding(motion.root(), Fraction(0), Fraction(0), Fraction(1))
     rows = taylor(gyrostat, motion.parameters, motion.start.flat, 4)
-    both = ([(motion.top.inertia[axis] * c, Fraction(0)) for c in rows[axis]] for axis in (0, 2))
+    taylors = ([(motion.top.inertia[axis] * c, Fraction(0)) for c in rows[axis]] for axis in (0, 2))
     gamma = None if motion.permanent else _fixed(motion, prepared, motion.start.gamma)
     inverses = [ball(1 / i) for i in motion.top.inertia]
-    return _Prepared(prepared, prepared.companions(winding, *both), inverses, gamma)
+    return _Prepared(prepared, prepared.companions(winding, *taylors), inverses, gamma)
 
 
 @cached_per_precision
@@ -191,6 +191,6 @@ def _fixed(motion: Gyrostat, prepared: PreparedMotion, vector: Vector) -> _Fixed
             taylor(gyrostat, motion.parameters, (*motion.start.omega, *fixed), 4)[3:]
             for fixed in (cross(m, across), across)
         ]
-        both = (unwound(products[0][axis], [-c for c in products[1][axis]], winding) for axis in (0, 2))
-        waves = prepared.companions(winding, *both)
+        taylors = (unwound(products[0][axis], [-c for c in products[1][axis]], winding) for axis in (0, 2))
+        waves = prepared.companions(winding, *taylors)
     return _Fixed(ball(share), waves, -1 / ball(square).sqrt(), ball(-1 / square))

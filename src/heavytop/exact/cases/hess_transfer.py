@@ -109,8 +109,8 @@ class System2:
                 z = radius * acb(0, 2 * arb.pi() * arc / _ARCS).exp() + spread
                 p, q = (abs(c * ((z + shift) ** 2 + gap)) for c, shift, gap in shapes)
                 w = abs(1 + z**2)
-                here = abs(self.torque) * w.sqrt() / p + abs(self.skew) * p.sqrt() / w
-                steepness, widest = steepness.max((here / q.sqrt()).upper()), widest.max((w / q).sqrt().upper())
+                value = abs(self.torque) * w.sqrt() / p + abs(self.skew) * p.sqrt() / w
+                steepness, widest = steepness.max((value / q.sqrt()).upper()), widest.max((w / q).sqrt().upper())
             return steepness, widest
 
 
@@ -251,11 +251,11 @@ class Transfer:
             phase, turns = phase - turn, turns + 1
         while phase < -arb.pi():
             phase, turns = phase + turn, turns - 1
-        there = _mirrored(self._inside(-phase)) if phase < 0 else self._inside(phase)
+        matrix = _mirrored(self._inside(-phase)) if phase < 0 else self._inside(phase)
         if turns == 0:
-            return there
+            return matrix
         power = _power(self.period, abs(turns))
-        return there * (power if turns > 0 else _adjugate(power))
+        return matrix * (power if turns > 0 else _adjugate(power))
 
     def inverse(self, phase: arb) -> arb_mat:
         """Y(phase)⁻¹."""
@@ -287,14 +287,14 @@ def _series(
                     quotient.append(solution_values[-1] - p1 * quotient[-1] - p2 * quotient[-2])
                 for solution_values, quotient in zip(solution, over_w, strict=True):
                     quotient.append(solution_values[-1] - quotient[-2])
-                own, other = half_q * v[-1] + q2 * v[-2], k_pq * (u_p[-1] + u_p[-3]) + skew_q * uu_w[-1]
-                for_v.append(own + other - q1 * for_v[-1] - q2 * for_v[-2])
-                own, other = half_q * w[-1] + q2 * w[-2], skew_pq * (u_w[-1] + p1 * u_w[-2] + p2 * u_w[-3])
-                for_w.append(own + other + k_pq * uu_p[-1] - q1 * for_w[-1] - q2 * for_w[-2])
-                own, other = half_p * uu_p[-1] + p2 * uu_p[-2], v_w[-1] + p1 * v_w[-2] + p2 * v_w[-3]
+                term, coupled = half_q * v[-1] + q2 * v[-2], k_pq * (u_p[-1] + u_p[-3]) + skew_q * uu_w[-1]
+                for_v.append(term + coupled - q1 * for_v[-1] - q2 * for_v[-2])
+                term, coupled = half_q * w[-1] + q2 * w[-2], skew_pq * (u_w[-1] + p1 * u_w[-2] + p2 * u_w[-3])
+                for_w.append(term + coupled + k_pq * uu_p[-1] - q1 * for_w[-1] - q2 * for_w[-2])
+                term, coupled = half_p * uu_p[-1] + p2 * uu_p[-2], v_w[-1] + p1 * v_w[-2] + p2 * v_w[-3]
                 slopes = (
                     k_p * v_p[-1] - skew * w_w[-1],
-                    own + uu_w[-2] + k_p * (w_p[-1] + w_p[-3]) - skew_p * other,
+                    term + uu_w[-2] + k_p * (w_p[-1] + w_p[-3]) - skew_p * coupled,
                     v_w[-2] - for_v[-1],
                     half_p * w_p[-1] + p2 * w_p[-2] - for_w[-1],
                 )

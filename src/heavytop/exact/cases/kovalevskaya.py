@@ -120,11 +120,11 @@ def _resting(level: KovalevskayaLevel, curve: Sequence[PhiRoot], start: WorkingS
 def pole(curve: Sequence[PhiRoot], occupied: Sequence[Interval]) -> tuple[arb, float]:
     """μ, outside both gaps, where the branch points in v come to lie as far from the gaps as possible; and how far."""
     real = ordered([root.value for root in curve])
-    taken = {(upper - 1, lower - 1) for upper, lower in occupied}
+    occupied_pairs = {(upper - 1, lower - 1) for upper, lower in occupied}
     lowest, highest = (curve[i].value.real.mid() for i in (real[0], real[-1]))
     candidates = [highest + share * (highest - lowest) for share in _BEYOND]
     for low, high in pairwise(real):
-        if (high, low) not in taken:
+        if (high, low) not in occupied_pairs:
             start, width = curve[low].value.real.mid(), (curve[high].value.real - curve[low].value.real).mid()
             candidates += [start + share * width for share in _SHARES]
 
@@ -305,9 +305,9 @@ class AbelMotion:
         for a, b in combinations(range(3), 2):
             i, j = self.cubic[a], self.cubic[b]
             weight = self.rows[0][a] * self.rows[1][b] - self.rows[0][b] * self.rows[1][a]
-            for k, own, other in ((0, first, second), (1, second, first)):
+            for k, of_variable, of_other in ((0, first, second), (1, second, first)):
                 if not isinstance(self.variables[k], Rest):
-                    total += rates[k] * self._turn(k, phases[k], own, i, j) * other[i] * other[j] * weight
+                    total += rates[k] * self._turn(k, phases[k], of_variable, i, j) * of_other[i] * of_other[j] * weight
         return total
 
     def _turn(self, variable: int, phase: Any, halves: Sequence[Any], i: int, j: int) -> Any:
@@ -437,17 +437,17 @@ class KovalevskayaAttitude:
         """v in the top's own axes, and Λ.  Raises Undecided where the working precision does not prove the phases."""
         level = self.motion.level
         phases, turns = self.motion.phases(time)
-        turned = self.motion.reduced(phases, turns, 1)
+        reduced = self.motion.reduced(phases, turns, 1)
         azimuth = along_gamma(level) * ball(time * level.rate) / 2
         for integral, phase, turn in zip(self.integrals, phases, turns, strict=False):
             azimuth += integral.at(phase, turn)
-        state = [x[0] for x in turned]
-        vector, off = level_vector(level, state), arb(0)
+        state = [x[0] for x in reduced]
+        vector, angle = level_vector(level, state), arb(0)
         rate = self.motion.approach(phases, turns)
         # with q near 0 the vector itself is known well enough
         if rate is not None and level.area != 0 and not state[1].contains(0):
-            vector, off = [2 * state[0], 2 * state[1], state[2]], _of_momentum(level, state, rate, self.side)
-        return Bearing.of(level.in_body(state[3:]), level.in_body(vector), azimuth - off)
+            vector, angle = [2 * state[0], 2 * state[1], state[2]], _of_momentum(level, state, rate, self.side)
+        return Bearing.of(level.in_body(state[3:]), level.in_body(vector), azimuth - angle)
 
 
 def along_gamma(level: KovalevskayaLevel) -> arb:

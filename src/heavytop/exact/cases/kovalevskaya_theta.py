@@ -86,8 +86,8 @@ class KovalevskayaLevel(Reduced):
     @property
     def fourth(self) -> Fraction:
         """k², Kovalevskaya's integral."""
-        one = Parameters((2, 2, 1), (*self.moment, 0), 0)
-        return Fraction(kovalevskaya(one, (*self.omega, *self.gamma), (0, 1, 2)))
+        parameters = Parameters((2, 2, 1), (*self.moment, 0), 0)
+        return Fraction(kovalevskaya(parameters, (*self.omega, *self.gamma), (0, 1, 2)))
 
     @property
     def weight(self) -> Fraction:
@@ -108,8 +108,8 @@ class KovalevskayaLevel(Reduced):
         s, square, constant = self.omega[0] ** 2 + self.omega[1] ** 2, self.moment_square, self.area
         h, g, p = self.energy, self.weight, self.along(self.omega)
         r12 = square * (-s * s + 2 * h * s - 2 * constant * p + g)
-        rest = square * (2 * h * s * s - 4 * constant * s * p + square * constant**2 - 2 * g * h) + 4 * g * p * p
-        return -4 * self.across(self.omega) ** 2 * w * w - 2 * r12 * w + rest
+        lowest = square * (2 * h * s * s - 4 * constant * s * p + square * constant**2 - 2 * g * h) + 4 * g * p * p
+        return -4 * self.across(self.omega) ** 2 * w * w - 2 * r12 * w + lowest
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,8 +165,8 @@ def roots(level: KovalevskayaLevel) -> list[PhiRoot]:
     cubic, k, double = level.cubic(), ball(level.fourth).sqrt(), level.double()
     if double * double != level.fourth:
         return [*_simple(cubic), PhiRoot(acb(k), 1, False), PhiRoot(acb(-k), 1, False)]
-    rest = cubic // polynomial(-double, Fraction(1))
-    return [PhiRoot(acb(ball(double)), 2, True), *_simple(rest), PhiRoot(acb(ball(-double)), 1, False)]
+    quadratic = cubic // polynomial(-double, Fraction(1))
+    return [PhiRoot(acb(ball(double)), 2, True), *_simple(quadratic), PhiRoot(acb(ball(-double)), 1, False)]
 
 
 def _simple(factor: fmpq_poly) -> list[PhiRoot]:
@@ -271,7 +271,7 @@ class HyperellipticCurve:
         halves = [_between(ordered, k) for k in range(4)]
         possible = []
         for signs in product((1, -1), repeat=3):
-            cycles = [halves[0], *((s * one, s * two) for s, (one, two) in zip(signs, halves[1:], strict=True))]
+            cycles = [halves[0], *((s * x, s * y) for s, (x, y) in zip(signs, halves[1:], strict=True))]
             (a, b), (c, d), (e, f), (g, h) = cycles
             try:
                 inverse = acb_mat([[a, a + e], [b, b + f]]).inv()
@@ -296,45 +296,45 @@ class HyperellipticCurve:
         return self.inverse * acb_mat([[part] for part in _from_root(self.roots, near, w, y)]) + half / 2
 
 
-def _integrals(places: Any, rest: Sequence[tuple[Any, Any]], factor: Any, lower: Any, upper: Any) -> Pair:
+def _integrals(path: Any, others: Sequence[tuple[Any, Any]], factor: Any, lower: Any, upper: Any) -> Pair:
     """factor times the integrals of Π rsqrt and w Π rsqrt over the straight way; rest: (root, value of w − root)."""
 
     def integrand(weight: int, s: acb, analytic: bool) -> acb:
-        w, product = places(s), acb(1)
-        for root, scale in rest:
+        w, product = path(s), acb(1)
+        for root, scale in others:
             product *= ((w - root) / scale).rsqrt(analytic=analytic)
         return product * w if weight else product
 
-    one, two = (factor * acb.integral(partial(integrand, weight), lower, upper) for weight in (0, 1))
-    return one, two
+    first, second = (factor * acb.integral(partial(integrand, weight), lower, upper) for weight in (0, 1))
+    return first, second
 
 
 def _between(roots: Sequence[acb], k: int) -> Pair:
     """A_(k+1), up to its sign: w = m + δ sin s."""
     middle, reach = (roots[k] + roots[k + 1]) / 2, (roots[k + 1] - roots[k]) / 2
-    rest = [(x, middle - x) for i, x in enumerate(roots) if i not in (k, k + 1)]
+    others = [(x, middle - x) for i, x in enumerate(roots) if i not in (k, k + 1)]
     factor = -2 * _I / square_root(acb(-2))
-    for _, scale in rest:
+    for _, scale in others:
         factor /= square_root(scale)
     quarter = arb.pi() / 2
-    return _integrals(lambda s: middle + reach * s.sin(), rest, factor, -quarter, quarter)
+    return _integrals(lambda s: middle + reach * s.sin(), others, factor, -quarter, quarter)
 
 
 def _from_root(roots: Sequence[acb], near: int, w: arb, y: arb) -> Pair:
     """∫ from e_near, the root nearest to w: w = e + (w − e) s²."""
     start = roots[near]
     step = w - start
-    rest = [(x, w - x) for i, x in enumerate(roots) if i != near]
+    others = [(x, w - x) for i, x in enumerate(roots) if i != near]
     if y.is_zero() and step.contains(0):
         return acb(0), acb(0)
     factor = 2 * step / y
     if not factor.is_finite():
         # beside a turning point: |y|² = 2 |w − e| Π |w − x|
         square = 2 * abs(step)
-        for _, scale in rest:
+        for _, scale in others:
             square /= abs(scale)
         factor = acb(arb(0, square.sqrt().upper()), arb(0, square.sqrt().upper()))
-    return _integrals(lambda s: start + step * s * s, rest, factor, 0, 1)
+    return _integrals(lambda s: start + step * s * s, others, factor, 0, 1)
 
 
 def _from_infinity(roots: Sequence[acb], w: arb, y: arb) -> Pair:
@@ -346,8 +346,8 @@ def _from_infinity(roots: Sequence[acb], w: arb, y: arb) -> Pair:
             result *= ((w - root * s * s) / (w - root)).rsqrt(analytic=analytic)
         return result
 
-    one, two = (acb.integral(partial(integrand, power), 0, 1) for power in (2, 0))
-    return -2 * w * one / y, -2 * w * w * two / y
+    first, second = (acb.integral(partial(integrand, power), 0, 1) for power in (2, 0))
+    return -2 * w * first / y, -2 * w * w * second / y
 
 
 def separation(values: Sequence[acb]) -> arb:
@@ -382,8 +382,9 @@ class ThetaMotion:
             origin += curve.image(w, y)
         rate = curve.inverse * acb_mat([[0], [1]])
         motion = cls(level, start, curve, origin, rate, ())
-        places = [next(i for i, e in enumerate(curve.roots) if e is root.value) for root in branch_points if root.cubic]
-        return replace(motion, rows=motion._rows([root.value for root in branch_points if root.cubic], places))
+        cubic = [root.value for root in branch_points if root.cubic]
+        indices = [next(i for i, e in enumerate(curve.roots) if e is value) for value in cubic]
+        return replace(motion, rows=motion._rows(cubic, indices))
 
     def at(self, time: Fraction, length: int) -> list[Any]:
         """The six components at ``time``, numbers, or series in t of that length."""
@@ -409,8 +410,8 @@ class ThetaMotion:
     def _thetas(self, z: acb_mat) -> list[Any]:
         """All 16 as series along v."""
         order = current_length() - 1
-        jets, (one, two) = acb_mat.theta_jets(self.curve.tau, z, order), self.rate.entries()
-        weights = [(n, one ** (n - i) * two**i) for n in range(order + 1) for i in range(n + 1)]
+        jets, (first, second) = acb_mat.theta_jets(self.curve.tau, z, order), self.rate.entries()
+        weights = [(n, first ** (n - i) * second**i) for n in range(order + 1) for i in range(n + 1)]
         thetas = []
         for number in range(jets.nrows()):
             row = [acb(0)] * (order + 1)
@@ -419,18 +420,18 @@ class ThetaMotion:
             thetas.append(acb_series(row, prec=current_length()))
         return thetas
 
-    def _rows(self, values: Sequence[acb], places: Sequence[int]) -> tuple[tuple[tuple[int, acb], ...], ...]:
+    def _rows(self, values: Sequence[acb], indices: Sequence[int]) -> tuple[tuple[tuple[int, acb], ...], ...]:
         """N, D and r as combinations of theta functions."""
         alphas, betas, inverse = linear(self.start, values)
         none = _number(_DELTA)
-        single = [_number(_plus(_DELTA, _ETA[k])) for k in places]
+        single = [_number(_plus(_DELTA, _ETA[k])) for k in indices]
         with series_length(ORDERS):
             thetas = self._thetas(self.origin)
             p, q = (acb_series(x) for x in self.start.motion[:2])
             kappas = []
             for number, a, b, e in zip(single, alphas, betas, values, strict=True):
-                left = ((p * p + q * q - e) * a + 2 * p * b) * thetas[none] * acb(0, -0.5)
-                kappas.append(_ratio(left, q * thetas[number]))
+                numerator = ((p * p + q * q - e) * a + 2 * p * b) * thetas[none] * acb(0, -0.5)
+                kappas.append(_ratio(numerator, q * thetas[number]))
         above, below = (
             tuple((number, inverse[row, j] * kappas[j]) for j, number in enumerate(single)) for row in (1, 2)
         )
@@ -439,11 +440,11 @@ class ThetaMotion:
             # constants may be taken anywhere: off the start, which may be special
             thetas = self._thetas(self.reduced(self.origin + self.rate * acb(arb(_ELSEWHERE))))
             for i, j in combinations(range(3), 2):
-                both = _number(_plus(_DELTA, _ETA[places[i]], _ETA[places[j]]))
-                one, two = thetas[single[i]], thetas[single[j]]
-                constant = (one[1] * two[0] - one[0] * two[1]) / (thetas[none][0] * thetas[both][0])
+                pair_number = _number(_plus(_DELTA, _ETA[indices[i]], _ETA[indices[j]]))
+                first, second = thetas[single[i]], thetas[single[j]]
+                constant = (first[1] * second[0] - first[0] * second[1]) / (thetas[none][0] * thetas[pair_number][0])
                 weight = above[i][1] * below[j][1] - above[j][1] * below[i][1]
-                spin.append((both, weight * constant))
+                spin.append((pair_number, weight * constant))
         return above, below, tuple(spin)
 
 

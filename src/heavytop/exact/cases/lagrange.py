@@ -216,18 +216,18 @@ class _Prepared:
 def _prepared(motion: Lagrange) -> _Prepared:
     prepared, winding, (across, axis) = motion.quartic().prepared(), motion.winding(), motion.frame
     rows = taylor(heavy_top, motion.parameters, motion.start.flat, 4)
-    beside = cross(axis, across)
-    both = (
-        unwound(_along(across, rows[k : k + 3]), [y / winding.square for y in _along(beside, rows[k : k + 3])], winding)
+    normal = cross(axis, across)
+    taylors = (
+        unwound(_along(across, rows[k : k + 3]), [y / winding.square for y in _along(normal, rows[k : k + 3])], winding)
         for k in (3, 0)
     )
     width, size, length = ball(dot(across, across)), ball(winding.square).sqrt(), ball(winding.square)
     directions = (
         [ball(u) / width for u in across],
-        [ball(v) / (width * size) for v in beside],
+        [ball(v) / (width * size) for v in normal],
         [ball(a) / length for a in axis],
     )
-    companions = prepared.companions(winding, *both)
+    companions = prepared.companions(winding, *taylors)
     plain = motion.frame == ((_ONE, _ZERO, _ZERO), (_ZERO, _ZERO, _ONE))
     spin = ball(dot(axis, motion.start.omega))
     return _Prepared(prepared, companions, spin, size, width.sqrt(), None if plain else directions)
@@ -308,12 +308,12 @@ class LagrangeGyrostat(ClosedForm):
         return Fraction(self.top.rotor[2] / self.top.inertia[2]) if self.top.rotor else Fraction(0)
 
     def evaluate(self, time: Fraction) -> list[BallLike]:
-        turned = self._turned(_top_of(self).evaluate(time), instant(time))
-        return [*turned[:2], turned[2] - ball(self._ahead), *turned[3:]]
+        rotated = self._turned(_top_of(self).evaluate(time), instant(time))
+        return [*rotated[:2], rotated[2] - ball(self._ahead), *rotated[3:]]
 
     def xi_at(self, time: Fraction) -> list[arb]:
-        known = _top_of(self).attitude(time, current_precision() + _ATTITUDE_BITS)
-        return self._turned(known, ball(time))
+        xi = _top_of(self).attitude(time, current_precision() + _ATTITUDE_BITS)
+        return self._turned(xi, ball(time))
 
     def _turned(self, vectors: Sequence[Balls], time: Balls) -> list[Balls]:
         """Rz(k3 t/I3) of each three components."""

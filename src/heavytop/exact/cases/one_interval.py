@@ -78,8 +78,8 @@ class IntervalCurve:
         u = b * speed * (turning * second + _HALF * factor * second.derivative()) - (c - a) * factor * shift
         second_rate = speed * (t.derivative() * second + _HALF * t * second.derivative())
         third_rate = speed * (u.derivative() * third + _HALF * u * third.derivative())
-        s, left = divmod(u * shift - second_rate, factor)
-        defects = speed * s.derivative() - factor * (t - u), left, third_rate - factor * s + t * shift
+        s, remainder = divmod(u * shift - second_rate, factor)
+        defects = speed * s.derivative() - factor * (t - u), remainder, third_rate - factor * s + t * shift
         for defect in defects:
             if defect.degree() >= 0:
                 raise NotInClass(
@@ -166,14 +166,14 @@ class OneGapMotion:
         slope = ball(curve.speed) * q * r * gap.density(ball(x))
         phase = gap.phase(ball(x), slope)
         # x' = K √Q √R and dx/dθ < 0 for 0 < θ < π: one sign gives the other
-        both = -1 if curve.speed > 0 else 1
-        motion = cls(curve, gap, rests, (low, high), tuple(others), gap.integrals(phase)[0], (1, both))
-        there = motion._square_roots(phase, 0)
-        which = next((k for k in (0, 1) if signs[k] and not there[k].contains(0)), None)
+        side = -1 if curve.speed > 0 else 1
+        motion = cls(curve, gap, rests, (low, high), tuple(others), gap.integrals(phase)[0], (1, side))
+        roots_at_start = motion._square_roots(phase, 0)
+        which = next((k for k in (0, 1) if signs[k] and not roots_at_start[k].contains(0)), None)
         if which is None:
             raise Undecided
-        if (there[which] > 0) != (signs[which] > 0):
-            motion = cls(curve, gap, rests, motion.stops, motion.others, motion.origin, (-1, -both))
+        if (roots_at_start[which] > 0) != (signs[which] > 0):
+            motion = cls(curve, gap, rests, motion.stops, motion.others, motion.origin, (-1, -side))
         return motion
 
     def at(self, time: arb) -> list[BallLike]:
@@ -209,7 +209,7 @@ class OneGapMotion:
     def _square_roots(self, phase: Balls, turns: int) -> tuple[Balls, Balls]:
         """√Q and √R."""
         x, halves = self.gap.position(phase), self.gap.ends(phase)
-        roots = [sign / rest.density(x) for sign, rest in zip(self.signs, self.rests, strict=True)]
+        roots = [sign / others.density(x) for sign, others in zip(self.signs, self.rests, strict=True)]
         for stop, half in zip(self.stops, halves, strict=True):
             roots[stop.of] *= -half if turns % 2 else half
         return roots[0], roots[1]
@@ -294,8 +294,8 @@ def _gamma_off(top: HeavyTop, start: State) -> list[Fraction]:
     rate, torque = _units(top, start)
     p, q, r = (w / rate for w in start.omega)
     heights = _curve(top, start).heights
-    wanted = [factor * value(part, p) for factor, part in zip((Fraction(1), q, r), heights, strict=True)]
-    return [g - w / torque for g, w in zip(start.gamma, wanted, strict=True)]
+    expected = [factor * value(part, p) for factor, part in zip((Fraction(1), q, r), heights, strict=True)]
+    return [g - w / torque for g, w in zip(start.gamma, expected, strict=True)]
 
 
 @dataclass(frozen=True, slots=True)

@@ -232,9 +232,9 @@ def _momentum_series(case: ZhukovskyVolterra) -> list[list[Fraction]]:
     """The Taylor coefficients of M at t = 0, up to t^10."""
     rows = taylor(HEAVY_GYROSTAT.field, _parameters(case), case.start.flat, _POLE + _LAST + 1)
     columns = []
-    for moment, own, row in zip(case.top.inertia, case._rotor, rows[:3], strict=True):
+    for moment, rotor, row in zip(case.top.inertia, case._rotor, rows[:3], strict=True):
         series = [moment * c for c in row]
-        columns.append([series[0] + own, *series[1:]])
+        columns.append([series[0] + rotor, *series[1:]])
     return columns
 
 
@@ -354,10 +354,10 @@ def _fixed(case: ZhukovskyVolterra, vector: Vector) -> _Fixed:
     if not any(across):
         return _Fixed(ball(share), None, None, invariant, order)
     winding = case.winding()
-    beside: Any = tuple(c / square for c in cross(momentum, across))
+    normal: Any = tuple(c / square for c in cross(momentum, across))
     root = ball(winding.square).sqrt()
     factors: Any = []
-    for real_part, imaginary in zip(_body_series(case, across), _body_series(case, beside), strict=True):
+    for real_part, imaginary in zip(_body_series(case, across), _body_series(case, normal), strict=True):
         rows = [_times_taylor(exact.series, part) for part in (real_part, imaginary)]
         # Φ^(k) begins with (−1)^k k!/t^(k + 1)
         parts = enumerate(reversed(unwound(rows[0], rows[1], winding)[:_POLE]))

@@ -60,8 +60,8 @@ class Jacobi:
         if self.period is None:
             return u, 0
         turns = nearest_integer(constant(u) / self.period[0])
-        rest = u - turns * self.period[0]
-        return (rest, turns) if abs(constant(rest)) < self.period[1] else (arb("nan"), 0)
+        reduced = u - turns * self.period[0]
+        return (reduced, turns) if abs(constant(reduced)) < self.period[1] else (arb("nan"), 0)
 
     def thetas(self, u: Any) -> tuple[acb_series, ...]:
         """θ1, θ2, θ3, θ4 at z = scale · u, for a real or complex series u."""
@@ -111,8 +111,8 @@ class Wave:
 
     def at(self, u: BallLike) -> tuple[Any, arb]:
         """The value at u reduced by n periods, a number or a series, and the angle n · period it is to be turned by."""
-        rest, turns = self.functions.reduced(u)
-        return self._number(rest) if isinstance(rest, arb) else self._series(rest), turns * self.period
+        reduced, turns = self.functions.reduced(u)
+        return self._number(reduced) if isinstance(reduced, arb) else self._series(reduced), turns * self.period
 
     def _number(self, u: arb) -> acb:
         theta, below = self.functions.theta, self.functions.parts[3]
@@ -170,9 +170,9 @@ def jacobi(parameter: arb, complement: arb) -> Jacobi:
     half_pi = arb.pi() / 2
     along: Any
     quarter = None if complement.is_zero() else half_pi / arb(1).agm(complement.sqrt())
-    other = None if parameter.is_zero() else half_pi / arb(1).agm(parameter.sqrt())
+    complementary = None if parameter.is_zero() else half_pi / arb(1).agm(parameter.sqrt())
     hyperbolic = quarter is None or bool(parameter.mid() > _LARGE)
-    across, along = (quarter, other) if hyperbolic else (other, quarter)
+    across, along = (quarter, complementary) if hyperbolic else (complementary, quarter)
     scale = (acb(0, 1) if hyperbolic else acb(1)) / (2 * along)
     tau = None if across is None else acb(0, across / along)
     nome = arb(0) if across is None else (-arb.pi() * across / along).exp()

@@ -119,9 +119,9 @@ class PreparedMotion:
         """D T⁴; on discriminant 0 by its exact coefficients, of which the first vanishes where f is a square."""
         square = point.square
         if isinstance(self.lattice, DegenerateLattice):
-            off: Any = difference(self.lattice.double, self.centre)
-            lead = 2 * off * off - self.offset
-            return square * square * as_ball(lead) + square * as_ball(4 * off) + 2
+            shift: Any = difference(self.lattice.double, self.centre)
+            lead = 2 * shift * shift - self.offset
+            return square * square * as_ball(lead) + square * as_ball(4 * shift) + 2
         above = point.above(self.centre)
         return above * above * 2 - square * square * as_ball(self.offset)
 
@@ -208,11 +208,11 @@ class Companions:
         # a complex ball times a real one is quick in this order only
         low, steep = phi * lift(point.scale), phi * lift(point.slope)
         if isinstance(self.wave.lattice, DegenerateLattice):
-            rest = slope
+            slope_part = slope
             if self.wave.index is None:
-                rest = -exponential(point.time, self.wave.rate) * factor
+                slope_part = -exponential(point.time, self.wave.rate) * factor
             # Φ' T² = K T ΦT − e: its K T ΦT stands in the cubic coefficient
-            parts = low * square, low, steep, rest * square, slope
+            parts = low * square, low, steep, slope_part * square, slope
         else:
             p = lift(point.high + point.root * point.square)
             parts = low * square, low * p, steep, slope * square, slope * p

@@ -92,9 +92,9 @@ class Theta:
 
     def _sum(self, base: arb, step: int, factors: Iterator[Any], kind: int, wide: Any) -> Any:
         """Σ base^(n + step n (n − 1)/2) factor_n C_n with C_n = T_n (kind 0) or U_n + kind U_(n−1)."""
-        taken, tail = self._enough(wide)
+        count, tail = self._enough(wide)
         total, power, ratio = next(factors) * arb_poly([1]), arb(1), base
-        for n in range(1, taken):
+        for n in range(1, count):
             power, ratio = power * ratio, ratio * base**step
             total += power * next(factors) * arb_poly(_chebyshev(n, kind))
         return total + (acb_poly([acb(tail, tail)]) if isinstance(total, acb_poly) else arb_poly([tail]))
@@ -301,9 +301,9 @@ def from_invariants(g2: Scalar, g3: Scalar) -> AnyLattice:
             "Give the invariants exactly, or as narrower balls.",
         )
     near = _cubic_roots(*(Fraction(midpoint(g)) for g in (g2, g3)))
-    one, two, three = (_enclose(root, g2, g3) for root in near.values)
-    gaps = ((one - two).real, (two - three).real) if near.gaps else None
-    return _from_roots(_Roots((one, two, three), gaps))
+    e1, e2, e3 = (_enclose(root, g2, g3) for root in near.values)
+    gaps = ((e1 - e2).real, (e2 - e3).real) if near.gaps else None
+    return _from_roots(_Roots((e1, e2, e3), gaps))
 
 
 @lru_cache(maxsize=64)
@@ -333,10 +333,10 @@ def _cubic_roots(g2: Fraction, g3: Fraction) -> _Roots:
     if discriminant > 0:
         # e = √(g2/3) cos(θ/3 + 2kπ/3) with cos θ = g3 √27/g2^(3/2)
         sine, cosine, third = ball(discriminant).sqrt(), ball(g3) * arb(27).sqrt(), arb.pi() * 2 / 3
-        angle, beside = arb.atan2(sine, cosine) / 3, arb.atan2(sine, -cosine) / 3
+        angle, supplement = arb.atan2(sine, cosine) / 3, arb.atan2(sine, -cosine) / 3
         size, wide = ball(g2 / 3).sqrt(), ball(g2).sqrt()
-        one, two, three = (acb(size * (angle + turn).cos()) for turn in (0, -third, third))
-        return _Roots((one, two, three), (wide * beside.sin(), wide * angle.sin()))
+        e1, e2, e3 = (acb(size * (angle + turn).cos()) for turn in (0, -third, third))
+        return _Roots((e1, e2, e3), (wide * supplement.sin(), wide * angle.sin()))
     # u³, v³ = |g3|/8 ± half, uv = g2/12, e = u + v, and the others −e/2 ± (u − v) i√3/2
     half, product = ball(-discriminant / 1728).sqrt(), ball(g2 / 12)
     first = (ball(abs(g3) / 8) + half).root(3)
@@ -473,10 +473,10 @@ def second_kind(lattice: AnyLattice, winding: Winding) -> SecondKind:
     root = ball(winding.square).sqrt()
     slope, turning = acb(0, ball(winding.slope) * root), acb(0, ball(winding.rate) * root)
     if not isinstance(lattice, Lattice):
-        off = ball(winding.value) - as_ball(lattice.double)
+        apart = ball(winding.value) - as_ball(lattice.double)
         if winding.value == lattice.double:
             return SecondKind(lattice, winding.value, slope, acb(0), acb(1), turning, 0)
-        rate = -slope / (2 * off)
+        rate = -slope / (2 * apart)
         return SecondKind(lattice, winding.value, slope, rate, acb(1), rate + turning, None)
     if winding.slope == 0:
         value = ball(winding.value)
@@ -506,10 +506,10 @@ def _imaginary_argument(lattice: Lattice, winding: Winding) -> acb:
     taken, by the addition theorem, DLMF 23.10.1.
     """
     value, (e1, e2, e3) = acb(ball(winding.value)), lattice.roots
-    beside = e2.imag == 0 and (value - e3).real > 0
-    if beside:
+    shifted = e2.imag == 0 and (value - e3).real > 0
+    if shifted:
         value = e1 + (e1 - e2) * (e1 - e3) / (value - e1)
     height = acb.elliptic_rf(e1 - value, e2 - value, e3 - value).real
-    if (winding.slope > 0) != beside:
+    if (winding.slope > 0) != shifted:
         height = -height
-    return acb(lattice.half_period if beside else 0, height)
+    return acb(lattice.half_period if shifted else 0, height)

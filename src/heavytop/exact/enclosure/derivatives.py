@@ -122,22 +122,22 @@ class Together:
     @classmethod
     def of(cls, field: Quadratic, data: Sequence[Quadratic]) -> Together:
         """y, then a column of Φ for each component of y, then one of σ for each of the data."""
-        size, places = field.dimension, {pair: k for k, pair in enumerate(field.pairs)}
+        size, indices = field.dimension, {pair: k for k, pair in enumerate(field.pairs)}
         rows = [*field.rows]
         for number, slope in enumerate([None] * size + [*data], 1):
             for i, row in enumerate(field.rows):
                 common = lcm(row.denominator, slope.rows[i].denominator if slope else 1)
-                factor, off = common // row.denominator, size * number
-                both = [(c * factor, *field.pairs[pair]) for c, pair in row.products]
-                products = [(c, at) for c, j, k in both for at in ((j, off + k), (k, off + j))]
-                linear = [(c * factor, off + j) for c, j in row.linear]
+                factor, offset = common // row.denominator, size * number
+                terms = [(c * factor, *field.pairs[pair]) for c, pair in row.products]
+                products = [(c, at) for c, j, k in terms for at in ((j, offset + k), (k, offset + j))]
+                linear = [(c * factor, offset + j) for c, j in row.linear]
                 if slope:
                     factor = common // slope.rows[i].denominator
                     products += [(c * factor, slope.pairs[pair]) for c, pair in slope.rows[i].products]
                     linear += [(c * factor, j) for c, j in slope.rows[i].linear]
-                numbered = tuple((c, places.setdefault(at, len(places))) for c, at in products)
+                numbered = tuple((c, indices.setdefault(at, len(indices))) for c, at in products)
                 rows.append(QuadraticComponent(common, numbered, tuple(linear)))
-        return cls(tuple(places), tuple(rows))
+        return cls(tuple(indices), tuple(rows))
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,16 +230,16 @@ def _columns(tangent: Tangent, step: Step, values: bool) -> Columns | None:
     if isinstance(step.series, WordSeries):
         words = tangent.columns
         return None if words is None else words.columns(step.node.centre, step.node.halvings, values)
-    size, one = tangent.field.dimension, 1 << tangent.precision
-    unit = [one * (i == j) for j in range(tangent.width) for i in range(size)]
+    size, unit_ulps = tangent.field.dimension, 1 << tangent.precision
+    unit = [unit_ulps * (i == j) for j in range(tangent.width) for i in range(size)]
     start = [*map(int, step.node.centre), *unit]
     table = coefficients(tangent.together, start, tangent.precision, step.node.halvings)
     if table is None:
         return None
-    own, after = table[:size], table[size:]
-    beyond = sum(max(map(abs, together)) for together in [*zip(*own, strict=True)][step.order + 1 :])
+    motion, after = table[:size], table[size:]
+    beyond = sum(max(map(abs, together)) for together in [*zip(*motion, strict=True)][step.order + 1 :])
     columns = [after[k : k + size] for k in range(0, len(after), size)]
-    return _WholeColumns(columns, tangent.precision, Whole(own, tangent.precision), float(beyond) * _UP)
+    return _WholeColumns(columns, tangent.precision, Whole(motion, tangent.precision), float(beyond) * _UP)
 
 
 def _along(step: Step, columns: Columns) -> tuple[StepSeries, float]:
@@ -260,15 +260,15 @@ def _errors(tangent: Tangent, step: Step, columns: Columns) -> tuple[float, floa
     factor, reach = exp(growth) * _UP, (float(beta.sum()) + wide) * _UP
     widest = (_ldexp(step.widest_ulps, step.node.errors.exponent) + beyond) * _UP
     sums = np.add.reduce(columns.sizes, 1)
-    off = h * widest * 2 * q * float(sums[:size].max()) * _UP
-    of_phi = factor * (_defect(tangent, step, columns, h) + off) * _UP
+    lag = h * widest * 2 * q * float(sums[:size].max()) * _UP
+    of_phi = factor * (_defect(tangent, step, columns, h) + lag) * _UP
     moved = factor * 2 * h * q * _ldexp(widest, -tangent.precision) * (step.powers + step.summed_error) * _UP
     of_sigma = 0.0
     if tangent.data:
         slopes = [(datum.field.q, datum.field.l) for datum in tangent.data]
         gq, gl = (max(float(value) for value in bounds) * _UP for bounds in zip(*slopes, strict=True))
-        off = h * widest * (2 * q * float(sums[size:].max()) + 2 * gq * reach + gl) * _UP
-        of_sigma = factor * (_defect(tangent, step, columns, h, (gq, gl)) + off) * _UP
+        lag = h * widest * (2 * q * float(sums[size:].max()) + 2 * gq * reach + gl) * _UP
+        of_sigma = factor * (_defect(tangent, step, columns, h, (gq, gl)) + lag) * _UP
     bounds = (of_phi * _UP, of_sigma * _UP, moved * _UP)
     return bounds if all(value < inf for value in bounds) else None
 
@@ -410,12 +410,12 @@ def _one_way(
     loss, steps = known.forecast(time, bits)
     places = _independent(known, motion) if data else ()
     spare = (_OF_DATA + _OF_LAWS * (len(places) < len(DATA))) * data
-    wanted = bits + loss + _GUARD + spare + int(min(loss, _FEW * bits) / 4)
-    own = bits + _OF_COLUMNS + 0.9 * min(loss, _MOST_OF_COLUMNS)
+    bits_of_motion = bits + loss + _GUARD + spare + int(min(loss, _FEW * bits) / 4)
+    bits_of_columns = bits + _OF_COLUMNS + 0.9 * min(loss, _MOST_OF_COLUMNS)
     for _ in range(_ATTEMPTS):
         columns = steps * (7 + len(places))
-        of_columns = motion.precision(own, columns)
-        planned = max(motion.precision(wanted, steps), of_columns)
+        of_columns = motion.precision(bits_of_columns, columns)
+        planned = max(motion.precision(bits_of_motion, steps), of_columns)
         if not motion.seconds(planned, loss, steps) + columns * seconds_a_step(*of_columns) < known.effort:
             break
         tangent = _tangent(known, motion, *of_columns, places)
@@ -432,7 +432,7 @@ def _one_way(
             enclosed[direction * span] = at
         else:
             return enclosed
-        wanted, own = (before[0] + lacking + _GUARD // 2 for before in (planned, of_columns))
+        bits_of_motion, bits_of_columns = (before[0] + lacking + _GUARD // 2 for before in (planned, of_columns))
     raise OutOfReach(
         f"Derivatives at t = {decimal_text(time, 6)} to so many digits are out of reach of a validated integration.",
         "Ask for fewer digits, or for an earlier time.",
@@ -444,8 +444,8 @@ def _independent(known: Validated, motion: ScaledMotion) -> tuple[int, ...]:
     p, gamma = known.parameters, known.start.gamma
     moment = max(range(3), key=lambda k: abs(p.moment[k]))
     inertia = max(range(3), key=lambda k: p.inertia[k])
-    least = max(map(abs, gamma)) * min(p.inertia) * motion.scaled.rate**2 / 2**_OF_LAWS
-    left_out = {3 + moment} if "moment" in known.system.enters and abs(p.moment[moment]) > least else set()
+    threshold = max(map(abs, gamma)) * min(p.inertia) * motion.scaled.rate**2 / 2**_OF_LAWS
+    left_out = {3 + moment} if "moment" in known.system.enters and abs(p.moment[moment]) > threshold else set()
     if not (isinstance(p.rotor, tuple) and any(p.rotor)):
         left_out.add(inertia)
     return tuple(k for k in range(len(DATA)) if k not in left_out)
@@ -477,12 +477,12 @@ def _data(known: Validated, motion: ScaledMotion, places: Sequence[int]) -> list
 def _datum(known: Validated, motion: ScaledMotion, datum: int) -> tuple[Datum, Coefficients | None]:
     """A datum, and its G over the lanes of the motion; None where they do not compute it."""
     scaled = motion.scaled
-    own, sign = own_parameters(scaled, known.parameters).mapped(Fraction), 1 if motion.forwards else -1
-    largest = coefficients_of(scaled.system, slope(scaled.system, own, datum, Fraction(1)), mpq(0)).largest
+    parameters, sign = own_parameters(scaled, known.parameters).mapped(Fraction), 1 if motion.forwards else -1
+    largest = coefficients_of(scaled.system, slope(scaled.system, parameters, datum, Fraction(1)), mpq(0)).largest
     unit = Fraction(2) ** (excess(scaled) - _SMALLER)
     if largest:
         unit /= Fraction(2) ** (largest.numerator.bit_length() - largest.denominator.bit_length() + 1)
-    rates = slope(scaled.system, own, datum, unit)
+    rates = slope(scaled.system, parameters, datum, unit)
     lanes = coefficients_of(scaled.system, rates, mpq(0))
     field = quadratic(lambda y: [sign * rate for rate in rates(y)], 6)
     by_lanes = quadratic(lambda y: [sign * rate for rate in lane_rates(scaled.system, lanes, y)], 6)
@@ -500,13 +500,17 @@ def _require_right(tangent: Tangent, motion: ScaledMotion) -> None:
         return
     centre = [round(value * 2**tangent.precision) for value in motion.scaled.state]
     for halvings in range(2, 64):
-        own, computed = certified.series(centre, halvings), columns.columns(centre, halvings, values=True)
-        if own is None or computed is None or computed.values is None:
+        along, computed = certified.series(centre, halvings), columns.columns(centre, halvings, values=True)
+        if along is None or computed is None or computed.values is None:
             continue
-        after = [0] * (computed.sizes.shape[1] - 1 - own.order)
-        values = [*(component + after for component in own.values), *(v for column in computed.values for v in column)]
-        off = sum(lacking(tangent.together, Whole(values, tangent.precision), tangent.precision, halvings)[: own.order])
-        if off > Fraction(max(own.rounding, *computed.rounding)):
+        after = [0] * (computed.sizes.shape[1] - 1 - along.order)
+        values = [
+            *(component + after for component in along.values),
+            *(v for column in computed.values for v in column),
+        ]
+        together = Whole(values, tangent.precision)
+        lack = sum(lacking(tangent.together, together, tangent.precision, halvings)[: along.order])
+        if lack > Fraction(max(along.rounding, *computed.rounding)):
             raise Contradiction(
                 f"Machine code in {tangent.precision} bits gives derivatives that are further from the truth than they "
                 "can be.",
@@ -521,23 +525,23 @@ def _run(tangent: Tangent, run: EnclosureRun, spans: list[Fraction]) -> Iterator
     node, size, rate = run.nodes[0], tangent.field.dimension, run.motion.scaled.rate
     unit = [[mpz((i == j) << tangent.precision) for j in range(tangent.width)] for i in range(size)]
     columns = _Columns(unit, np.zeros((size, tangent.width)), 0)
-    rest = list(spans)
-    while rest:
-        taken = _step(tangent, run, node)
-        if taken is None:
-            yield rest[0], None
+    remaining = list(spans)
+    while remaining:
+        made = _step(tangent, run, node)
+        if made is None:
+            yield remaining[0], None
             return
-        whole, along, own = taken
-        while rest and node.time + whole.length >= rest[0] * rate:
-            tau = (rest[0] * rate - node.time) / whole.length
-            at = own if tau == 1 else step_derivatives(tangent, along, tau)
-            yield rest.pop(0), None if at is None else _at(tangent, whole, at, columns, tau)
-        if rest:
-            transfer = whole.transfer()
-            columns = _carried(tangent, whole, own, columns, transfer)
-            node = run.after(whole, transfer)
+        motion_step, along, of_step = made
+        while remaining and node.time + motion_step.length >= remaining[0] * rate:
+            tau = (remaining[0] * rate - node.time) / motion_step.length
+            at = of_step if tau == 1 else step_derivatives(tangent, along, tau)
+            yield remaining.pop(0), None if at is None else _at(tangent, motion_step, at, columns, tau)
+        if remaining:
+            transfer = motion_step.transfer()
+            columns = _carried(tangent, motion_step, of_step, columns, transfer)
+            node = run.after(motion_step, transfer)
             if not np.isfinite(columns.radii).all():
-                yield rest[0], None
+                yield remaining[0], None
                 return
 
 
@@ -545,13 +549,13 @@ def _step(tangent: Tangent, run: EnclosureRun, node: Node) -> tuple[Step, Step, 
     """A step, the same in their bits, and its derivatives; shorter where they need it, in integers if words fail."""
     for certified in (tangent.certified, None) if tangent.certified else (None,):
         for shorter in range(_SHORTENED):
-            taken = run.step(replace(node, halvings=node.halvings + shorter))
-            if taken is None:
+            motion_step = run.step(replace(node, halvings=node.halvings + shorter))
+            if motion_step is None:
                 return None
-            along = in_other_bits(tangent.field, taken, tangent.precision, certified)
-            own = None if along is None else step_derivatives(tangent, along, Fraction(1))
-            if along is not None and own is not None:
-                return taken, along, own
+            along = in_other_bits(tangent.field, motion_step, tangent.precision, certified)
+            of_step = None if along is None else step_derivatives(tangent, along, Fraction(1))
+            if along is not None and of_step is not None:
+                return motion_step, along, of_step
     return None
 
 
@@ -580,10 +584,10 @@ def _carried(
     tangent: Tangent, taken: Step, own: StepDerivatives, columns: _Columns, transfer: tuple[Matrix, Matrix, float]
 ) -> _Columns:
     """(J, S) at the end of a step, in its new frame."""
-    frame, turned, slack = transfer
+    frame, transformed, slack = transfer
     inverse = (norm(frame.T) + slack) * _UP
     slack = (slack + inverse * own.moved * norm(taken.node.errors.frame)) * _UP
-    radii = np.abs(turned) @ columns.radii + slack * columns.radii.max(axis=0)
+    radii = np.abs(transformed) @ columns.radii + slack * columns.radii.max(axis=0)
     reach = (np.abs(frame.T).sum(axis=1) + slack) * _UP
     radii = (radii + np.outer(reach, _local(tangent, own, columns))) * _UP
     exponent = columns.exponent

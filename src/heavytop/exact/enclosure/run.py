@@ -200,19 +200,19 @@ class Pilot:
         self, span: Fraction, hopeless: Callable[[float, float], bool]
     ) -> tuple[Sequence[Fraction], Sequence[float]]:
         """The times and the bits lost as far as ``span``, where the pilot comes so far."""
-        node, known, bits = self.ahead
-        if known and known[-1] >= span:
-            return known, bits
-        times, losses, run = list(known), list(bits), self.run
+        node, known_times, bits = self.ahead
+        if known_times and known_times[-1] >= span:
+            return known_times, bits
+        times, losses, run = list(known_times), list(bits), self.run
         while (not times or times[-1] < span) and len(times) < _PILOT_STEPS:
-            taken = len(times)
-            part = min(1.0, taken / _SETTLED)
-            if taken and taken % _TRIED == 0 and hopeless(losses[-1], part * taken * _times_as_far(span, times[-1])):
+            count = len(times)
+            part = min(1.0, count / _SETTLED)
+            if count and count % _TRIED == 0 and hopeless(losses[-1], part * count * _times_as_far(span, times[-1])):
                 break
-            following = run.last = run.step(node)  # it may cover the time that is asked for
-            if following is None:
+            proven = run.last = run.step(node)  # it may cover the time that is asked for
+            if proven is None:
                 break
-            node = run.after(following)
+            node = run.after(proven)
             times.append(node.time)
             losses.append(run.lost(node))
         with _one_writer:
@@ -278,7 +278,7 @@ class ScaledMotion:
     def of(cls, system: System, p: Parameters, y: tuple[Fraction, ...], forwards: bool) -> ScaledMotion:
         """The motion of (Ω, γ), or of (Ω, γ, ξ), from ``y``."""
         scaled, size = Scaled.of(system, p, y, bounded=True), len(y)
-        own = own_parameters(scaled, p).mapped(mpq)
+        scaled_parameters = own_parameters(scaled, p).mapped(mpq)
         sign = 1 if forwards else -1
         lanes = dataclasses.replace(  # quicker than Fractions, and as exact
             scaled.coefficients,
@@ -286,9 +286,9 @@ class ScaledMotion:
         )
 
         def as_lane(state: tuple[mpq, ...]) -> list[mpq]:
-            values = [*system.field(own, state[:6])]
+            values = [*system.field(scaled_parameters, state[:6])]
             if len(state) == 9:
-                values += system.attitude(own, state[:6], state[6:])
+                values += system.attitude(scaled_parameters, state[:6], state[6:])
             return [sign * rate for rate in values]
 
         def by_lanes(state: tuple[mpq, ...]) -> list[mpq]:
@@ -310,14 +310,14 @@ class ScaledMotion:
                         break
                     return grid.total, True
         # multiples of an eighth of the power of two below
-        least = max(64, ceil(bits))
-        unit = 1 << max(4, least.bit_length() - 4)
-        return -(-least // unit) * unit, False
+        needed = max(64, ceil(bits))
+        unit = 1 << max(4, needed.bit_length() - 4)
+        return -(-needed // unit) * unit, False
 
     def fewer(self, precision: int, lost: float) -> int:
         """The working precision that is enough where the last ``lost`` bits of ``precision`` are within the errors."""
-        wanted = precision - lost + _GUARD
-        return precision if wanted > precision else min(precision, self.precision(max(wanted, _FEWEST), inf)[0])
+        needed = precision - lost + _GUARD
+        return precision if needed > precision else min(precision, self.precision(max(needed, _FEWEST), inf)[0])
 
     def certified_at(self, precision: int) -> CertifiedSeries | None:
         """The Taylor coefficients in ``precision`` bits; None where they are exact integers."""
@@ -531,9 +531,9 @@ class Validated:
         if key not in self._runs:
             motion = self._motion(direction, start)
             certified = motion.certified(precision) if in_words else None
-            off = () if self.uncertainty is None else self.uncertainty.start[: len(start)]
-            lacking = [value / size for value, size in zip(off, motion.scaled.sizes[: len(off)], strict=True)]
-            node = start_node(motion.field, motion.scaled.state, precision, lacking)
+            errors = () if self.uncertainty is None else self.uncertainty.start[: len(start)]
+            scaled = [error / size for error, size in zip(errors, motion.scaled.sizes[: len(errors)], strict=True)]
+            node = start_node(motion.field, motion.scaled.state, precision, scaled)
             self._runs.setdefault(key, EnclosureRun(motion, precision, (node,), certified))
         return self._runs[key]
 
@@ -625,11 +625,11 @@ def _steps_of(run: EnclosureRun, span: Fraction) -> Iterator[Step]:
 
 
 @whole_evaluation
-def _rounded(start: tuple[Fraction, ...], bits: int, off: tuple[Fraction, ...]) -> list[arb]:
+def _rounded(start: tuple[Fraction, ...], bits: int, errors: tuple[Fraction, ...]) -> list[arb]:
     with working_precision(bits):
-        if not off:
+        if not errors:
             return [ball(value) for value in start]
-        wide = [arb(0, ball(value).abs_upper()) for value in off[: len(start)]]
+        wide = [arb(0, ball(value).abs_upper()) for value in errors[: len(start)]]
         return [ball(value) + more for value, more in zip(start, wide, strict=True)]
 
 

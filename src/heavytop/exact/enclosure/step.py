@@ -101,9 +101,9 @@ def quadratic(field: Field, dimension: int) -> Quadratic:
             _keep(table[i], (j, j), (plus[j][i] + minus[j][i]) / 2)
             _keep(lines[i], j, (plus[j][i] - minus[j][i]) / 2)
         for k in range(j + 1, dimension):
-            both = field(tuple(x + y for x, y in zip(unit[j], unit[k], strict=True)))
+            of_sum = field(tuple(x + y for x, y in zip(unit[j], unit[k], strict=True)))
             for i in range(dimension):
-                _keep(table[i], (j, k), both[i] - plus[j][i] - plus[k][i])
+                _keep(table[i], (j, k), of_sum[i] - plus[j][i] - plus[k][i])
     return _assemble(table, lines)
 
 
@@ -337,8 +337,8 @@ class Step:
         of its ulp in each component, and the set is wider by as much; with 0 the sum is exact.
         """
         errors = self.node.errors
-        frame, turned, slack = transfer or self.transfer()
-        radii = Errors(turned, errors.radii, 0).sizes(slack=slack)
+        frame, transformed, slack = transfer or self.transfer()
+        radii = Errors(transformed, errors.radii, 0).sizes(slack=slack)
         reach = np.abs(frame.T).sum(axis=1) + slack
         rounding = float(np.ldexp(0.5, dropped - errors.exponent)) if dropped else 0.0
         radii = (radii + reach * (self.local + rounding)) * _UP
@@ -350,10 +350,10 @@ class Step:
 
     def _halvings(self) -> int:
         """The next step: where the orders a bit are few it is doubled, where they are many it is halved."""
-        (few, many), wanted = self.series.thrifty, self.order / (self.precision + 16)
-        if wanted > many:
+        (few, many), orders_per_bit = self.series.thrifty, self.order / (self.precision + 16)
+        if orders_per_bit > many:
             return self.node.halvings + 1
-        return self.node.halvings - int(wanted < few and norm(self.variation[1]) < _LARGEST_SLOPE / 2)
+        return self.node.halvings - int(orders_per_bit < few and norm(self.variation[1]) < _LARGEST_SLOPE / 2)
 
 
 def rounded_off(centre: Sequence[int], dropped: int) -> tuple[mpz, ...]:
@@ -382,9 +382,9 @@ def _new_frame(variation: Matrix, variation_error: float, errors: Errors) -> tup
     rounding = 2 * (size + 4) * _UNIT
     transposed, before = norm(frame.T), norm(errors.frame)
     product = (norm(variation) + variation_error) * before
-    off = norm(frame.T @ frame - _identity(size)) + rounding * transposed * size
+    defect = norm(frame.T @ frame - _identity(size)) + rounding * transposed * size
     # (1 + F)^-1 differs from 1 by at most |F|/(1 − |F|)
-    inverse = off / (1 - off) * transposed if off < 1 else inf
+    inverse = defect / (1 - defect) * transposed if defect < 1 else inf
     slack = inverse * product + transposed * before * variation_error + 3 * rounding * transposed * product
     return frame, frame.T @ carried, max(slack, inverse) * _UP
 
@@ -408,16 +408,16 @@ def coefficient_bound(field: Quadratic, size: Fraction) -> Fraction:
     return field.q * size + field.l
 
 
-def start_node(field: Quadratic, start: tuple[Fraction, ...], precision: int, off: Sequence[Fraction] = ()) -> Node:
+def start_node(field: Quadratic, start: tuple[Fraction, ...], precision: int, errors: Sequence[Fraction] = ()) -> Node:
     """The node at time 0 of the motion from ``start``, rounded to ulps of 2^-precision.
 
-    off: how far each component of the true start may be from it; none where it is exact.
+    errors: how far each component of the true start may be from it; none where it is exact.
     """
     scaled = [value * 2**precision for value in start]
     centre = tuple(mpz(round(value)) for value in scaled)
     radii = np.array([0.0 if value.denominator == 1 else 0.5 for value in scaled])
-    if any(off):
-        radii += np.array([float(min(value * 2**precision, _FAR_OFF)) * _UP + _TINY for value in off])
+    if any(errors):
+        radii += np.array([float(min(value * 2**precision, _FAR_OFF)) * _UP + _TINY for value in errors])
     bound = coefficient_bound(field, max(map(abs, start)))
     # the first step has K h < 1/4
     halvings = 2 + int(bound).bit_length() if bound >= 1 else 2 - int(1 / (bound + Fraction(1, 16))).bit_length()

@@ -124,13 +124,13 @@ _held = _Held()
 
 def _note() -> None:
     """The context is not what it was set to: remember what the user wants from now on, and set it again."""
-    precision, wanted, own = (ctx.prec, ctx.cap), _held.context, _held.own
+    precision, context, users = (ctx.prec, ctx.cap), _held.context, _held.own
     _held.disturbed = _held.ever = True
     _held.own = (
-        own[0] if precision[0] == wanted[0] else precision[0],
-        own[1] if precision[1] == wanted[1] else precision[1],
+        users[0] if precision[0] == context[0] else precision[0],
+        users[1] if precision[1] == context[1] else precision[1],
     )
-    ctx.prec, ctx.cap = wanted
+    ctx.prec, ctx.cap = context
 
 
 def _set(context: tuple[int, int]) -> None:
@@ -459,8 +459,8 @@ def value_text(value: arb, digits: int) -> tuple[str, str]:
     middle, wide = m << (e - unit), r << (s - unit)
     text = "0" if abs(middle) <= wide else ratio_text(middle, 1 << -unit, digits, ROUND_HALF_EVEN)
     above, below = Decimal(text).as_integer_ratio()
-    off = wide * below + abs((above << -unit) - middle * below)
-    return text, ratio_text(off, below << -unit, _RADIUS_DIGITS, ROUND_CEILING)
+    error = wide * below + abs((above << -unit) - middle * below)
+    return text, ratio_text(error, below << -unit, _RADIUS_DIGITS, ROUND_CEILING)
 
 
 @whole_evaluation
@@ -571,12 +571,12 @@ def _quotient(square: arb_mat) -> arb:
 def _positive_definite(shift: arb, square: arb_mat) -> bool:
     """Whether shift − S is: every pivot of its L D Lᵀ factorisation is proven to be positive."""
     size = square.nrows()
-    rest = [[(shift if i == j else arb(0)) - square[i, j] for j in range(size)] for i in range(size)]
+    remaining = [[(shift if i == j else arb(0)) - square[i, j] for j in range(size)] for i in range(size)]
     for k in range(size):
-        pivot = rest[k][k]
+        pivot = remaining[k][k]
         if not pivot > 0:
             return False
         for i in range(k + 1, size):
             for j in range(k + 1, i + 1):
-                rest[i][j] = rest[j][i] = rest[i][j] - rest[i][k] * rest[j][k] / pivot
+                remaining[i][j] = remaining[j][i] = remaining[i][j] - remaining[i][k] * remaining[j][k] / pivot
     return True

@@ -79,43 +79,43 @@ class Inversion:
         """
         count, periods = len(self.variables), self._periods()
         aim = arb_mat([[value] for value in target])
-        lost = [arb("nan")] * count, [0] * count
+        unproven = [arb("nan")] * count, [0] * count
         try:
             cells = periods.solve(aim).entries()
         except ZeroDivisionError:
-            return lost
+            return unproven
         if not all(cell.is_finite() for cell in cells):
-            return lost
+            return unproven
         turns = [nearest_integer(cell) if v.periodic else 0 for v, cell in zip(self.variables, cells, strict=True)]
-        rest = aim - periods * arb_mat([[n] for n in turns])
+        remainder = aim - periods * arb_mat([[n] for n in turns])
         first = [(c - n) * v.turn for v, c, n in zip(self.variables, cells, turns, strict=True)]
         try:
-            return self._refined(self._estimated(first, rest), rest), turns
+            return self._refined(self._estimated(first, remainder), remainder), turns
         except ZeroDivisionError:
-            return lost
+            return unproven
 
     def _defect(self, phases: Sequence[arb], target: arb_mat) -> arb_mat:
         return arb_mat([[value] for value in self.values(phases)]) - target
 
-    def _estimated(self, phases: list[arb], rest: arb_mat) -> list[arb]:
+    def _estimated(self, phases: list[arb], target: arb_mat) -> list[arb]:
         """Newton's iteration in few bits, every step as short as it must be to come nearer."""
         with working_precision(_FEW_BITS):
             now = [phase.mid() for phase in phases]
-            defect = self._defect(now, rest)
+            defect = self._defect(now, target)
             for _ in range(_ITERATIONS):
                 step, share, error = (self._inverse(now) * defect).entries(), arb(1), _size(defect)
                 while True:
-                    following = [(x - share * s).mid() for x, s in zip(now, step, strict=True)]
-                    defect = self._defect(following, rest)
+                    candidate = [(x - share * s).mid() for x, s in zip(now, step, strict=True)]
+                    defect = self._defect(candidate, target)
                     if not _size(defect) > error or share < _SHORTEST:
                         break
                     share /= 2
-                now = following
+                now = candidate
                 if all(abs(s * share) < _SETTLED * (1 + abs(x)) for s, x in zip(step, now, strict=True)):
                     break
         return now
 
-    def _refined(self, near: list[arb], rest: arb_mat) -> list[arb]:
+    def _refined(self, near: list[arb], target: arb_mat) -> list[arb]:
         """Newton's iteration in balls at growing precision, and the proof at the last."""
         needed, precisions = current_precision() // 2 + 8, []
         while needed > _FEW_BITS:
@@ -124,28 +124,28 @@ class Inversion:
         for precision in reversed(precisions):
             with working_precision(precision):
                 for _ in range(_REPEATED):
-                    step = (self._inverse(near) * self._defect(near, rest)).entries()
+                    step = (self._inverse(near) * self._defect(near, target)).entries()
                     near = [(x - s).mid() for x, s in zip(near, step, strict=True)]
                     # the next one would be of the size of its square
                     if all(abs(s) < arb(2) ** (8 - precision // 2) for s in step):
                         break
-        return self._proven(near, rest)
+        return self._proven(near, target)
 
     def _inverse(self, phases: list[arb]) -> arb_mat:
         return self.slopes(phases).inv().mid()
 
-    def _proven(self, near: list[arb], rest: arb_mat) -> list[arb]:
+    def _proven(self, near: list[arb], target: arb_mat) -> list[arb]:
         """Krawczyk's image of a box around the phases, if it lies inside the box."""
         inverse = self._inverse(near)
-        step = (inverse * self._defect(near, rest)).entries()
+        step = (inverse * self._defect(near, target)).entries()
         floor = arb(2) ** (-current_precision())
         for widening in (2, 16, 256):
-            off = [arb(0, (widening * (abs(s).upper() + floor)).upper()) for s in step]
-            box = [x + o for x, o in zip(near, off, strict=True)]
+            radii = [arb(0, (widening * (abs(s).upper() + floor)).upper()) for s in step]
+            box = [x + o for x, o in zip(near, radii, strict=True)]
             spread = -(inverse * self.slopes(box))
             for i in range(len(near)):
                 spread[i, i] += 1
-            moved = (spread * arb_mat([[o] for o in off])).entries()
+            moved = (spread * arb_mat([[o] for o in radii])).entries()
             image = [x - s + m for x, s, m in zip(near, step, moved, strict=True)]
             if all(wide.contains_interior(narrow) for wide, narrow in zip(box, image, strict=True)):
                 return image
@@ -308,10 +308,10 @@ def variable_between(ends: tuple[int, int], roots: Sequence[tuple[acb, int]], le
         return Rest(low)
     if not low < high:
         raise Undecided
-    rest = Roots.of(lead, [root for number, root in enumerate(roots) if number not in ends])
+    others = Roots.of(lead, [root for number, root in enumerate(roots) if number not in ends])
     if roots[ends[0]][1] > 1:
-        return Approach(high, low, rest, most=most)
-    return Approach(low, high, rest, most=most) if roots[ends[1]][1] > 1 else Gap(low, high, rest, most=most)
+        return Approach(high, low, others, most=most)
+    return Approach(low, high, others, most=most) if roots[ends[1]][1] > 1 else Gap(low, high, others, most=most)
 
 
 @dataclass(frozen=True, slots=True)
@@ -441,8 +441,8 @@ def counts(widths: Sequence[arb | None]) -> tuple[int, int]:
     Raises OutOfReach where they are too many.
     """
     floats = [None if width is None else max(float(width), _NARROWEST) for width in widths]
-    wanted = (current_precision() + 6) * log(2) - sum(log(-expm1(-width)) for width in floats if width)
-    first, second = (1 if width is None else max(4, ceil(wanted / width)) for width in floats)
+    decay = (current_precision() + 6) * log(2) - sum(log(-expm1(-width)) for width in floats if width)
+    first, second = (1 if width is None else max(4, ceil(decay / width)) for width in floats)
     if first * second * (first + second) > _MOST_WORK:
         raise OutOfReach(
             f"The azimuth needs {first} x {second} Fourier terms: the level is nearly degenerate.",
@@ -491,14 +491,14 @@ class Product:
             dropped += sum(row[wide:] if m < tall else row, arb(0))
         symmetries = first.symmetry, second.symmetry
         orders = symmetries[0].orders(tall), symmetries[1].orders(wide)
-        speeds = [[rate * twice / 2 for twice in own] for rate, own in zip(rates, orders, strict=True)]
-        squares, floats = [[x * x for x in own] for own in speeds], [[float(x) for x in own] for own in speeds]
+        speeds = [[rate * twice / 2 for twice in row] for rate, row in zip(rates, orders, strict=True)]
+        squares, floats = [[x * x for x in row] for row in speeds], [[float(x) for x in row] for row in speeds]
         rows, resonances = [], []
         for m, (square, size) in enumerate(zip(squares[0], floats[0], strict=True)):
             row = []
-            for n, (other, length) in enumerate(zip(squares[1], floats[1], strict=True)):
+            for n, (second_square, length) in enumerate(zip(squares[1], floats[1], strict=True)):
                 if abs(size - length) > _RESONANT * (size + length):
-                    row.append(table[m][n] / (square - other))
+                    row.append(table[m][n] / (square - second_square))
                 else:
                     row.append(arb(0))
                     resonances.append(Resonance(table[m][n], (orders[0][m], orders[1][n])))

@@ -104,8 +104,8 @@ class SineSums:
         """Each sum at the angle, at the working precision."""
         bits = current_precision()
         if bits not in self._seen:
-            least = max(self.sizes) * arb(2) ** (-bits - 8)
-            count = max((n for n, size in enumerate(self.sizes, 1) if not size < least), default=1)
+            smallest = max(self.sizes) * arb(2) ** (-bits - 8)
+            count = max((n for n, size in enumerate(self.sizes, 1) if not size < smallest), default=1)
             tails = [arb(0, sum((abs(a).upper() for a in row[count:]), arb(0)).upper()) for row in self.rows]
             self._seen[bits] = _SeenSums([[+a for a in row[:count]] for row in self.rows], tails)
         return self._seen[bits].at(angle)
@@ -348,9 +348,9 @@ class Approach:
         at_limit = self.column[0]
 
         def values(v: arb) -> list[arb]:
-            here = self.density(v)
+            density = self.density(v)
             # 1/√a − 1/√b = (b − a)/(√a √b (√a + √b))
-            values = [-quotient(v) * here * at_limit / (1 / here + 1 / at_limit)]
+            values = [-quotient(v) * density * at_limit / (1 / density + 1 / at_limit)]
             value = at_limit
             for _ in range(count - 1):
                 values.append(v * values[-1] + value)
@@ -364,18 +364,18 @@ class Approach:
         return self.turning + self.length * (ratio * ratio)
 
     def ends(self, phase: Balls) -> tuple[Balls, Balls]:
-        ratio, rest = tanh_sech(phase)
-        turning, limit = self.root * ratio, self.root * rest
+        tanh, sech = tanh_sech(phase)
+        turning, limit = self.root * tanh, self.root * sech
         return (turning, limit) if self.length > 0 else (limit, turning)
 
     def bend(self, phase: Balls) -> Balls:
-        _, rest = tanh_sech(phase)
-        return rest * (-2 if self.length > 0 else 2)
+        _, sech = tanh_sech(phase)
+        return sech * (-2 if self.length > 0 else 2)
 
     def phase(self, v: arb, slope: arb) -> arb:
         """X from v and dv/dX = 2L sech² X tanh X."""
-        left = self.limit - v
-        return (slope / (2 * left) * (self.length / left).sqrt()).asinh()
+        distance = self.limit - v
+        return (slope / (2 * distance) * (self.length / distance).sqrt()).asinh()
 
     def integrals(self, phase: arb) -> list[arb]:
         sums = self.sums.at(2 * (phase / 2).tanh().atan())
@@ -386,8 +386,8 @@ def _sines(means: list[arb]) -> list[arb]:
     """The coefficients of sin χ, sin 2χ, ... of ∫ q dy, from the means of q cos 2nχ."""
     cosines = [means[0], *(2 * mean for mean in means[1:])]
     sums = []
-    for k, (one, two) in enumerate(zip(cosines, [*cosines[1:], arb(0)], strict=True)):
-        sums += [((2 * one if k == 0 else one) + two) / (2 * (2 * k + 1)), arb(0)]
+    for k, (cosine, following) in enumerate(zip(cosines, [*cosines[1:], arb(0)], strict=True)):
+        sums += [((2 * cosine if k == 0 else cosine) + following) / (2 * (2 * k + 1)), arb(0)]
     return sums
 
 
