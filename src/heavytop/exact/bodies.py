@@ -1,4 +1,4 @@
-"""The motion of a body in the axes in which it was given: known in principal axes, and turned into them."""
+"""The motion of a body in its input axes: computed in principal axes, and rotated back."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ Evaluate = Callable[[tuple[Resolved, ExactSolution], int], Sequence[arb]]
 
 @dataclass(frozen=True, slots=True)
 class BodyMotion:
-    """The known motion of a body or a top, in the axes in which it was given.
+    """The exact motion of a body or a top in its input axes.
 
-    body, start: as given, any attitude included.  system: of the motion.  finder: of the motion in principal axes.
+    body, start: the input, any attitude included.  system: of the motion.  finder: of the motion in principal axes.
     effort: of its enclosure, :class:`heavytop.exact.enclosure.run.Validated`.
-    Its balls hold the true motion, irrational data included: proven, not assumed.
+    Its balls contain the true motion, also for irrational data.
     """
 
     body: Body | HeavyTop
@@ -53,12 +53,12 @@ class BodyMotion:
 
     @property
     def method(self) -> str:
-        """How it is known."""
+        """The closed form or enclosure behind it."""
         return self.solution.method
 
     @property
     def source(self) -> str:
-        """Where its formulas are published."""
+        """The publication of its formulas."""
         return self.solution.source
 
     @property
@@ -72,24 +72,24 @@ class BodyMotion:
         return self._known(_DATA_BITS)[1]
 
     def state(self, time: Fraction, bits: int) -> list[arb]:
-        """(Ω, γ) at ``time`` in the axes given: six balls of ``bits`` bits.
+        """(Ω, γ) at ``time`` in the input axes: six balls of ``bits`` bits.
 
         Raises OutOfReach where they cannot be proven.
         """
         return self._evaluated(time, bits, lambda known, working: known[1].state(time, working))
 
     def with_attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """Ω, γ and ξ at ``time`` in the axes given: nine balls.
+        """Ω, γ and ξ at ``time`` in the input axes: nine balls.
 
-        ξ starts at the first row of the attitude given, or at :func:`heavytop.top.attitude.perpendicular` of γ.
+        ξ starts at the first row of the input attitude, or at :func:`heavytop.top.attitude.perpendicular` of γ.
         Raises OutOfReach where it cannot be proven, InputError for |γ| ≠ 1 where no attitude was given.
         """
         return list(self.known_attitude(time, bits)[1](time, bits))
 
     def known_attitude(self, latest: Fraction, bits: int) -> tuple[str, Whole]:
-        """How the attitude is known, and Ω, γ, ξ at (time, bits) as :meth:`with_attitude` gives them.
+        """The method of the attitude, and a function of (time, bits) that returns Ω, γ, ξ as :meth:`with_attitude`.
 
-        The closed form of the attitude is taken where it gives so many bits at the time ``latest``.
+        It uses the closed form of the attitude where that yields ``bits`` bits at the time ``latest``.
         """
         known = self._known(_DATA_BITS)
         if known[0].uncertainty is not None:
@@ -108,7 +108,7 @@ class BodyMotion:
         return self._evaluated(time, bits, evaluate)
 
     def _evaluated(self, time: Fraction, bits: int, evaluate: Evaluate) -> list[arb]:
-        """The vectors of ``evaluate`` in the axes given, with so many bits."""
+        """The vectors of ``evaluate`` in the input axes, to ``bits`` bits."""
         known = self._known(_DATA_BITS)
         resolved = known[0]
         if resolved.uncertainty is None:
@@ -143,7 +143,7 @@ class BodyMotion:
 
 
 def _turned(known: tuple[Resolved, ExactSolution], bits: int, evaluate: Evaluate) -> list[arb]:
-    """Evaluated vectors, in the axes given, with ``bits`` bits."""
+    """The vectors of ``evaluate`` rotated to the input axes, to ``bits`` bits."""
     if not known[0].is_rotated:
         return list(evaluate(known, bits))
     working = bits + 4

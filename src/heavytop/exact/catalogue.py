@@ -1,7 +1,7 @@
-"""Which closed form a motion has: exact rational tests on the exact data, up to a renaming of the axes.
+"""The closed form of a motion, found by exact rational tests on the exact data, up to a renaming of the axes.
 
-Constants first, then elementary functions, then elliptic and hyperelliptic ones; the validated enclosure for
-every other motion.
+Constants come first, then elementary functions, then elliptic and hyperelliptic ones; every other motion has its
+validated enclosure.
 A class is found by its exact conditions, first on the body and then on the start (:mod:`heavytop.exact.solution`);
 :func:`table` writes them down.  Its constructor makes the same test, and raises NotInClass with what fails.
 """
@@ -53,9 +53,9 @@ _KEEP: tuple[Axes, ...] = ALL[:1]
 
 @dataclass(frozen=True, slots=True)
 class Class:
-    """A class of motions: exact conditions on the body, on the start, and what makes the closed form of one.
+    """A class of motions: exact conditions on the body and on the start, and the constructor of a closed form.
 
-    namings: of the axes, under which the class looks different.
+    namings: the renamings of the axes to try.
     """
 
     name: str
@@ -66,7 +66,7 @@ class Class:
 
     @classmethod
     def of(cls, case: type[ClosedForm], namings: tuple[Axes, ...]) -> Class:
-        """By the case's own conditions and constructor."""
+        """From the conditions and the constructor of a case."""
         return cls(case.__name__, case.body, case.starts, case, namings)
 
 
@@ -109,7 +109,7 @@ _CLASSES: dict[str, tuple[Class, ...]] = {
 
 
 def table() -> list[tuple[str, str, str, str]]:
-    """A line a class, in the order of trial: system, class, conditions on the body, conditions on the start."""
+    """System, name, conditions on the body and conditions on the start of each class, in the order of trial."""
 
     def text(conditions: Conditions) -> str:
         return "; ".join(condition.text for condition in conditions) or "any"
@@ -119,16 +119,16 @@ def table() -> list[tuple[str, str, str, str]]:
 
 
 def matches(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> Iterator[ExactSolution]:
-    """Every closed form of this motion, the simplest first; none for a motion that has none here.
+    """Every closed form of this motion, the simplest first.
 
-    A heavy gyrostat whose rotor has no momentum has those of the heavy top too.
+    A heavy gyrostat whose rotor has no momentum also has those of the heavy top.
     Raises InputError where the system does not admit the top and start, OutOfReach for numbers of too many digits.
     """
     yield from (attempt for attempt in _attempts(top, start, system) if not isinstance(attempt, LevelNotDone))
 
 
 def _attempts(top: HeavyTop, start: State, system: System) -> Iterator[ExactSolution | LevelNotDone]:
-    """:func:`matches`, and the reason, where a class has the motion but does not cover its level."""
+    """The items of :func:`matches`, and the error of each class that has the motion but does not cover its level."""
     require_handy(top, start)
     system.parameters(top, start)
     for entry in _CLASSES[system.name]:
@@ -149,9 +149,9 @@ def _attempts(top: HeavyTop, start: State, system: System) -> Iterator[ExactSolu
 
 
 def find(top: HeavyTop, start: State, system: System = HEAVY_TOP, effort: float = EFFORT) -> ExactSolution:
-    """The simplest closed form of this motion, or its validated enclosure, of which a request may take that effort.
+    """The simplest closed form of this motion, or its validated enclosure with that effort per request.
 
-    The enclosure names the degenerate level where a class has the motion but not this level of it.
+    The enclosure names the degenerate level where a class has the motion but does not cover its level.
     Raises InputError where the system does not admit the top and start, OutOfReach for numbers of too many digits.
     """
     level = ""
@@ -165,11 +165,11 @@ def find(top: HeavyTop, start: State, system: System = HEAVY_TOP, effort: float 
 def state_and_attitude(
     solution: ExactSolution, latest: Fraction, bits: int, effort: float = EFFORT
 ) -> tuple[str, Attitude]:
-    """How the attitude of ``solution`` is known, and Ω, γ, ξ at (time, bits), ξ from ``initial_xi`` of its γ.
+    """The method of the attitude of ``solution``, and a function of (time, bits) that returns Ω, γ, ξ.
 
-    By the closed form where that gives so many bits at the time ``latest``, else by the validated enclosure of the same
-    motion up to its reach, within the effort; the state of a motion that has a closed form is always of it.
-    It raises OutOfReach where the bits cannot be proven, InputError for an enclosure of |γ| ≠ 1.
+    ξ starts at ``initial_xi`` of γ.  It comes from the closed form where that yields ``bits`` bits at the time
+    ``latest``, else from the validated enclosure within the effort; Ω and γ come from the closed form wherever there is
+    one.  The function raises OutOfReach where the bits cannot be proven, InputError for an enclosure of |γ| ≠ 1.
     """
     if isinstance(solution, Validated):
         return solution.method, solution.with_attitude

@@ -39,16 +39,16 @@ from heavytop.top.attitude import attitude_from_angles, perpendicular
 from heavytop.top.equations import HEAVY_TOP, Parameters, System, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State
 
-# What the elliptic motions share: working precision, exact Taylor coefficients at the start, rotation in space.
+# Shared by elliptic motions: caches per working precision, exact Taylor coefficients at the start, rotation in space.
 
 
 Made = TypeVar("Made")
 
 
 def cached_per_precision(make: Callable[[Any], Made]) -> Callable[[Any], Made]:
-    """``make(motion)`` once for each motion and working precision: kept in the motion's ``made``.
+    """Cache ``make(motion)`` for each motion and working precision, in the motion's ``made``.
 
-    A cache of functools would hash a dozen Fractions at each look-up, longer than many a state takes.
+    A cache of functools would hash a dozen Fractions at each look-up, which takes longer than many states.
     """
 
     @wraps(make)
@@ -67,7 +67,7 @@ def cached_per_precision(make: Callable[[Any], Made]) -> Callable[[Any], Made]:
 
 
 def once(make: Callable[[Any], Made]) -> Callable[[Any], Made]:
-    """``make(motion)`` once for each motion: of what is exact, and needs no working precision."""
+    """Cache ``make(motion)`` for each motion: for exact results, which depend on no working precision."""
 
     @wraps(make)
     def look_up(motion: Any) -> Made:
@@ -82,7 +82,7 @@ def once(make: Callable[[Any], Made]) -> Callable[[Any], Made]:
 def taylor(
     field: Callable[[Parameters, Any], tuple[Any, ...]], parameters: Parameters, start: Sequence[Fraction], length: int
 ) -> list[list[Fraction]]:
-    """The exact Taylor coefficients of each component at the start, from the field itself."""
+    """The exact Taylor coefficients of each component at the start, computed from the field."""
     exact = parameters.mapped(rational)
     rows = [[rational(value)] for value in start]
     with series_length(length):
@@ -111,7 +111,7 @@ def unwound(real: Sequence[Fraction], imaginary: Sequence[Fraction], winding: Wi
 
 
 def initial_xi(gamma: Vector) -> list[arb]:
-    """ξ at t = 0 where nobody gave it: :func:`perpendicular` of γ/|γ|; raises InputError for γ = 0."""
+    """The default ξ at t = 0: :func:`perpendicular` of γ/|γ|; raises InputError for γ = 0."""
     square = dot(gamma, gamma)
     if square == 0:
         raise InputError(
@@ -125,7 +125,7 @@ def initial_xi(gamma: Vector) -> list[arb]:
 
 
 Carry = Callable[[Sequence[Any]], list[Any]]
-"""Takes the body components at t = 0 of a vector fixed in space to those at the time in question."""
+"""Maps the body components at t = 0 of a vector fixed in space to those at another time."""
 
 
 def instant(time: Fraction) -> Any:
@@ -136,7 +136,7 @@ def instant(time: Fraction) -> Any:
 def solved(start: Sequence[arb], rates: Callable[[list[Any]], Sequence[Any]]) -> list[Any]:
     """The power series with y' = rates(y) from ``start``, of the length set by :func:`series_length`; numbers for 1.
 
-    By Picard's iteration, each of which makes one coefficient more.
+    Each step of Picard's iteration adds one coefficient.
     """
     length = current_length()
     if length == 1:
@@ -148,9 +148,9 @@ def solved(start: Sequence[arb], rates: Callable[[list[Any]], Sequence[Any]]) ->
 
 
 def in_units(motion: Sequence[Any], rate: Fraction, size: Fraction) -> list[Any]:
-    """Ω and γ, series in t' or numbers, as those in t = t'/rate of Ω times ``rate`` and γ times ``size``.
+    """Ω times ``rate`` and γ times ``size`` as series in t = t'/rate, from series in t' or numbers.
 
-    Of the length set by :func:`series_length`, whatever that of the series is; numbers for 1.
+    The result has the length set by :func:`series_length`; numbers for 1.
     """
     units, length = [ball(rate)] * 3 + [ball(size)] * 3, current_length()
     if length == 1:
@@ -176,7 +176,7 @@ def balls(vector: Sequence[Fraction]) -> list[arb]:
 
 
 def sign(value: Fraction) -> int:
-    """+1, −1, or +1 for 0: the factor that keeps a root on the side where the start lies."""
+    """+1 or −1, and +1 for 0: the sign of a root at the start."""
     return -1 if value < 0 else 1
 
 
@@ -190,13 +190,13 @@ def rotate(vector: Sequence[Balls], omega: Sequence[Fraction], time: Balls) -> l
 
 
 def about(axis: Sequence[BallLike], cosine: BallLike, sine: BallLike, vector: Sequence[BallLike]) -> list[Any]:
-    """The vector turned about a unit vector, axis 2 towards axis 1 about axis 3, by the angle given."""
+    """The vector rotated about a unit vector, axis 2 towards axis 1 about axis 3, by an angle."""
     along, across = dot(axis, vector), cross(vector, axis)
     return [along * n + cosine * (v - along * n) + sine * w for n, v, w in zip(axis, vector, across, strict=True)]
 
 
 def between(before: Sequence[Sequence[BallLike]], now: Sequence[Sequence[BallLike]]) -> Carry:
-    """The map that carries vectors with a frame of three unit vectors, from where it was to where it is."""
+    """The rotation that takes one frame of three unit vectors to another."""
 
     def carry(vector: Sequence[BallLike]) -> list[Any]:
         parts = [dot(vector, direction) for direction in before]
@@ -222,9 +222,9 @@ def taylor_of_fixed(parameters: Parameters, start: State, vector: Sequence[Fract
 
 
 def carried_xi(gamma: Vector, carried: Callable[[Vector], tuple[Sequence[Any], Sequence[Any]]]) -> list[Any]:
-    """ξ where it started as :func:`initial_xi` of γ, which need not be rational.
+    """The image of :func:`initial_xi` of γ, which need not be rational.
 
-    carried: of an exact vector b ⟂ γ the images of b and γ × b/|γ|, both fixed in space.
+    carried: returns the images of b and of γ × b/|γ| for an exact vector b ⟂ γ fixed in space.
     """
     xi, size, basis = initial_xi(gamma), ball(dot(gamma, gamma)).sqrt(), across(gamma)
     exact, norm = balls(basis), ball(dot(basis, basis))
@@ -233,7 +233,7 @@ def carried_xi(gamma: Vector, carried: Callable[[Vector], tuple[Sequence[Any], S
 
 
 def tanh_sech(argument: Balls) -> tuple[Balls, Balls]:
-    """(tanh, sech) of a number or series; nothing grows, whatever its sign and size."""
+    """(tanh, sech) of a number or series, by decaying exponentials only."""
     side = -1 if constant(argument) < 0 else 1
     decay = (-side * argument).exp()
     total = 1 + decay * decay
@@ -241,7 +241,7 @@ def tanh_sech(argument: Balls) -> tuple[Balls, Balls]:
 
 
 class Evaluated(ABC):
-    """A motion given by one formula, :meth:`evaluate`, over power series."""
+    """A motion with one formula over power series, :meth:`evaluate`."""
 
     __slots__ = ()
 
@@ -253,7 +253,7 @@ class Evaluated(ABC):
         """
 
     def own_time(self, time: Fraction) -> Fraction:
-        """``time`` in the unit whose size costs working bits: that of a form which works in units of its own."""
+        """``time`` in the units in which the form computes: its size costs working bits."""
         return time
 
     def state(self, time: Fraction, bits: int) -> list[arb]:
@@ -271,7 +271,7 @@ class Evaluated(ABC):
 
 
 class WithXi(Evaluated):
-    """A motion whose attitude is evaluated as its state is: :meth:`xi_at`."""
+    """A motion with a formula for its attitude, :meth:`xi_at`."""
 
     __slots__ = ()
 
@@ -280,13 +280,13 @@ class WithXi(Evaluated):
         """ξ at ``time``, at FLINT's working precision; raises Undecided where that does not suffice."""
 
     def attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """ξ, a unit vector fixed in space and ⟂ γ, in body components; raises OutOfReach where it is not known."""
+        """ξ, a unit vector fixed in space and ⟂ γ, in body components; raises OutOfReach where it cannot be proven."""
         return to_bits(lambda _working: self.xi_at(time), bits, self.own_time(time))
 
 
 @dataclass(frozen=True, slots=True)
 class ClosedForm(WithXi):
-    """The motion of ``top`` from ``start``; the dataclass of each case brings ``method``, ``source``, its conditions.
+    """The motion of ``top`` from ``start``; each case defines ``method``, ``source`` and its conditions.
 
     body, starts: exact conditions on the top and on the start; the constructor raises NotInClass where one fails.
     made: what :func:`once` and :func:`cached_per_precision` keep.
@@ -305,22 +305,22 @@ class ClosedForm(WithXi):
 
     @property
     def system(self) -> System:
-        """The heavy top, but for the cases that say otherwise."""
+        """The heavy top, unless a case overrides it."""
         return HEAVY_TOP
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Without what was made: balls do not go from process to process."""
+        """Pickle without caches: balls cannot be pickled."""
         return type(self), tuple(getattr(self, field.name) for field in fields(self) if field.init)
 
 
 class WithAttitude(ClosedForm):
-    """A closed form that carries all vectors fixed in space, and so γ, by one formula: :meth:`motion`."""
+    """A closed form that moves all vectors fixed in space, γ among them, by one formula: :meth:`motion`."""
 
     __slots__ = ()
 
     @abstractmethod
     def motion(self, time: BallLike) -> tuple[list[BallLike], Carry]:
-        """Ω at the number or series ``time``, and what carries vectors fixed in space there."""
+        """Ω at the number or series ``time``, and the map of vectors fixed in space."""
 
     def evaluate(self, time: Fraction) -> list[BallLike]:
         omega, carry = self.motion(instant(time))
@@ -331,7 +331,7 @@ class WithAttitude(ClosedForm):
 
 
 class WithAngles(Evaluated):
-    """A motion whose Euler angles are given by formulas too."""
+    """A motion with formulas for its Euler angles."""
 
     __slots__ = ()
 
@@ -361,10 +361,10 @@ def constant(value: Any) -> arb:
     return value[0] if isinstance(value, arb_series) else arb(value)
 
 
-# The attitude of any known motion: ξ, a unit vector fixed in space and ⟂ γ, in body components.
+# The attitude of any exact motion: ξ, a unit vector fixed in space and ⟂ γ, in body components.
 #
-# A motion's own attitude starts where its formula says.  Turned about γ by one constant angle it is the attitude that
-# starts at :func:`heavytop.exact.closed_form.initial_xi`, for ξ and η = γ × ξ/|γ| are both fixed in space.
+# The ξ of a closed form starts where its formula says.  A rotation about γ by a constant angle makes it start at
+# :func:`heavytop.exact.closed_form.initial_xi`, for ξ and η = γ × ξ/|γ| are both fixed in space.
 
 
 Attitude = Callable[[Fraction, int], Sequence[Any]]
@@ -373,10 +373,10 @@ Attitude = Callable[[Fraction, int], Sequence[Any]]
 
 @dataclass(frozen=True, slots=True)
 class Turned:
-    """Ω, γ and ξ of a motion from any attitude ``own`` of it, turned so that ξ(0) is ``initial_xi`` of its γ.
+    """Ω, γ and ξ of a motion from an attitude ``own``, rotated so that ξ(0) is ``initial_xi`` of its γ.
 
-    Called with (time, bits): nine balls of ``bits`` bits, Ω and γ of the same evaluation as ξ.
-    Raises OutOfReach where they cannot be proven, InputError for γ = 0.
+    A call with (time, bits) returns nine balls of ``bits`` bits, Ω and γ of the same evaluation as ξ.
+    It raises OutOfReach where they cannot be proven, InputError for γ = 0.
     """
 
     solution: ExactSolution
@@ -395,7 +395,7 @@ class Turned:
 
 @cached_per_precision
 def _turn(turned: Turned) -> tuple[arb, arb, arb]:
-    """Cosine and sine of the turn from the own ξ(0), and |γ|: the same at every time."""
+    """Cosine and sine of the constant angle from the form's ξ(0), and |γ|."""
     gamma = turned.solution.start.gamma
     xi, own_xi = initial_xi(gamma), turned.own(Fraction(0), current_precision())
     length = ball(dot(gamma, gamma)).sqrt()
@@ -403,9 +403,9 @@ def _turn(turned: Turned) -> tuple[arb, arb, arb]:
 
 
 def starting_at(xi: Vector, gamma: Vector, known: Attitude) -> Attitude:
-    """Ω, γ, ξ with ξ(0) = ``xi`` out of those with ξ(0) = :func:`perpendicular` of γ(0) = ``gamma``, of length 1.
+    """Ω, γ, ξ with ξ(0) = ``xi`` from those with ξ(0) = :func:`perpendicular` of γ(0) = ``gamma``, of length 1.
 
-    Turned about γ by the constant angle between the two, whose cosine and sine are rational.
+    The constant angle between the two has a rational cosine and sine.
     """
     began = perpendicular(gamma)
     if xi == began:
@@ -449,7 +449,7 @@ def inverse(axes: Axes) -> Axes:
 
 
 def permuted(vector: Sequence[Any], axes: Axes) -> tuple[Any, Any, Any]:
-    """Qv: component number ``axes[k]`` of v comes to place k."""
+    """Qv: component ``axes[k]`` of v becomes component k."""
     return vector[axes[0]], vector[axes[1]], vector[axes[2]]
 
 
@@ -481,24 +481,24 @@ class Renamed:
 
     @property
     def method(self) -> str:
-        """The solution's own, and the names its axes have here."""
+        """The method of the solution, and the new names of its axes."""
         axes = inverse(self.axes)
         return f"{self.solution.method}, axes renamed {axes[0] + 1}, {axes[1] + 1}, {axes[2] + 1}"
 
     @property
     def source(self) -> str:
-        """That of the solution."""
+        """The source of the solution."""
         return self.solution.source
 
     @property
     def system(self) -> System:
-        """That of the solution."""
+        """The system of the solution."""
         return self.solution.system
 
     def _renamed(self, values: Sequence[Balls]) -> list[Balls]:
         omega: tuple[BallLike, ...] = permuted(values[:3], self.axes)
         if orientation(self.axes) < 0:
-            # a ball is negated exactly: the minus sign would round it to FLINT's precision of the moment
+            # negated exactly: a minus sign would round to FLINT's current precision
             omega = tuple(w.neg(exact=True) if isinstance(w, arb) else -w for w in omega)
         return [*omega, *permuted(values[3:6], self.axes)]
 
@@ -517,14 +517,14 @@ class Renamed:
         return self._renamed(second(time, bits))
 
     def attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """ξ, starting where :func:`heavytop.exact.closed_form.initial_xi` says in the new names.
+        """ξ from :func:`heavytop.exact.closed_form.initial_xi` in the new names.
 
         Raises NotInClass where the solution has no attitude.
         """
         return Turned(self, self.own_attitude)(time, bits)[6:]
 
     def own_attitude(self, time: Fraction, bits: int) -> Sequence[arb]:
-        """ξ in the new names, starting where the solution's does.  Raises NotInClass where it has no attitude."""
+        """ξ of the solution in the new names.  Raises NotInClass where it has no attitude."""
         attitude = getattr(self.solution, "attitude", None)
         if attitude is None:
             raise NotInClass(f"{self.method} has no attitude in closed form.", "Integrate the attitude along with it.")

@@ -1,17 +1,17 @@
-"""A body and a start in principal axes, in exact rationals, and how far these are off.
+"""A body and a start in principal axes, in exact rationals, with bounds of the error of these data.
 
-Everything is computed in principal axes, from exact rationals.  Where the principal axes of a tensor, or an attitude
-given by angles, are irrational, rational data stand for them: a rational rotation A near the principal axes, a rational
-rotation near the attitude.  What they lack is known and bounded (:class:`Uncertainty`):
+All motions are computed in principal axes from exact rationals.  Where the principal axes of a tensor, or an attitude
+given by angles, are irrational, rational data replace them: a rational rotation A near the principal axes, a rational
+rotation near the attitude.  Their error is bounded (:class:`Uncertainty`):
 
 the true tensor in the axes A is D + E with D diagonal and E = Aᵀ J A − D, exactly, so that with X = (D + E)⁻¹
 
     Ω' = D⁻¹ ((D Ω + k) × Ω + γ × n) + δ,
     |δ| ≤ |X| |E| |D⁻¹| ((|J| |Ω| + |k|) |Ω| + |n|) + |D⁻¹| ((|E| |Ω| + |δk|) |Ω| + |δn|),
 
-and |Ω| is bounded for all times by the energy, |Ω|² ≤ 2 (½ Ω·JΩ + 2 |n|)/min J.  The enclosure takes δ as a part of its
-defect and the error of the start as the radii of its first node, so that its balls hold the *true* motion.  Algebraic
-motions (:mod:`heavytop.exact.cases.algebraic_starts`) are known in themselves, and need none of this.
+and |Ω| is bounded for all times by the energy, |Ω|² ≤ 2 (½ Ω·JΩ + 2 |n|)/min J.  The enclosure adds δ to its
+defect and takes the error of the start as the radii of its first node, so that its balls contain the *true* motion.
+Algebraic motions (:mod:`heavytop.exact.cases.algebraic_starts`) have algebraic numbers as data, and need none of this.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _MARGIN = Fraction(1, 2**200)
 
 @dataclass(frozen=True, slots=True)
 class Uncertainty:
-    """How far the true motion is from the rational data that stand for it.
+    """Bounds of the error of rational data that replace irrational ones.
 
     start: of each component of (Ω, γ, ξ) at t = 0.  rate: of each component of Ω', at any time of the true motion.
     """
@@ -48,8 +48,8 @@ class Uncertainty:
 class Resolved:
     """A motion in principal axes, in exact rationals.
 
-    top, start: in principal axes.  xi: ξ at t = 0 in these; None where γ is off length 1 and no attitude was given.
-    axes: the rows of A, v_given = A v_principal.  uncertainty: what the data lack; None where they are exact.
+    top, start: in principal axes.  xi: ξ at t = 0 in these; None where |γ| ≠ 1 and there is no attitude.
+    axes: the rows of A, v_input = A v_principal.  uncertainty: None where the data are exact.
     """
 
     top: HeavyTop
@@ -60,19 +60,19 @@ class Resolved:
 
     @property
     def is_rotated(self) -> bool:
-        """Whether the axes given are not these."""
+        """Whether the input axes are not the principal ones."""
         return self.axes != IDENTITY
 
     def in_given_axes(self, state: Any) -> list[BallLike]:
-        """A state, (Ω, γ) or (Ω, γ, ξ), in the axes given, over any ring that rationals act on."""
+        """A state, (Ω, γ) or (Ω, γ, ξ), in the input axes, over any ring that rationals act on."""
         return [value for begin in range(0, len(state), 3) for value in rotated(self.axes, state[begin : begin + 3])]
 
 
 def resolve(body: Body | HeavyTop, start: State, bits: int = 256) -> Resolved:
     """The motion of a body, or of a top, from ``start``, in principal axes.
 
-    bits: to which what is irrational is rounded: a tensor relative to its smallest moment, the rest to the largest of
-    its kind.
+    bits: of the rounding of irrational data: of a tensor relative to its smallest moment, of others to the largest of
+    their kind.
     """
     spin, rows, errors = _start(start, bits)
     up = rows[2] if rows is not None else start.gamma
@@ -83,7 +83,7 @@ def resolve(body: Body | HeavyTop, start: State, bits: int = 256) -> Resolved:
 
 
 def _start(start: State, bits: int) -> tuple[Vector, tuple[Vector, Vector, Vector] | None, tuple[Fraction, Fraction]]:
-    """Ω, the rows of R (None where only γ is known), and how far Ω and each row may be off."""
+    """Ω, the rows of R (None where only γ is known), and bounds of the error of Ω and of each row."""
     attitude = start.attitude
     if attitude is None:
         return start.omega, None, (Fraction(0), Fraction(0))
@@ -96,7 +96,7 @@ def _start(start: State, bits: int) -> tuple[Vector, tuple[Vector, Vector, Vecto
 
 
 def _near(attitude: Attitude, bits: int) -> tuple[tuple[Vector, Vector, Vector], Fraction]:
-    """A rational rotation, and how far its entries are off: about 2^-bits, of large angles by more working bits."""
+    """A rational rotation, and a bound of the error of its entries, about 2^-bits; large angles take more bits."""
     for more in _MORE_BITS:
         rows = attitude.rational_rows(bits + more)
         error = _distance(attitude, rows, bits + more)
@@ -130,7 +130,7 @@ def _resolved(
     if exact and not any(start_errors):
         state = State(rotated(back, spin), rotated(back, up))
         return Resolved(top, state, None if xi is None else rotated(back, xi), axes, None)
-    # short numbers in place of long ones, where they are not exact anyway
+    # inexact data are shortened
     rounding = Fraction(1, 2**bits)
     omega, speed = _shortened(rotated(back, spin), bits)
     rounded, lacks = (top, None) if exact else _rounded_top(top, bits)
@@ -145,13 +145,13 @@ def _resolved(
 
 
 def _shortened(values: Vector, bits: int) -> tuple[Vector, Fraction]:
-    """The vector with components of ``bits`` bits, and a bound of how far each has moved."""
+    """The vector rounded to ``bits`` bits, and the largest change of a component."""
     first, second, third = (round_to(value, bits) for value in values)
     return (first, second, third), max(abs(a - b) for a, b in zip((first, second, third), values, strict=True))
 
 
 def _rounded_top(top: HeavyTop, bits: int) -> tuple[HeavyTop, tuple[Vector, Vector]]:
-    """The top with short numbers, and what its n and k lack."""
+    """The top with rounded numbers, and the errors of its n and k."""
     centre = tuple(round_to(value, bits) for value in top.centre)
     rotor = None if top.rotor is None else tuple(round_to(value, bits) for value in top.rotor)
     short = HeavyTop(top.inertia, top.weight, centre, rotor, top.mass)
@@ -165,7 +165,7 @@ def _rounded_top(top: HeavyTop, bits: int) -> tuple[HeavyTop, tuple[Vector, Vect
 def _field_error(
     body_and_axes: tuple[Body, PrincipalAxes], top: HeavyTop, lacks: tuple[Vector, Vector] | None, start_speed: Fraction
 ) -> Fraction:
-    """A bound of every component of δ: see the head of this file.  Norms are Frobenius' and Euclid's, rounded up."""
+    """A bound of every component of δ in the head of this file.  Norms are Frobenius' and Euclid's, rounded up."""
     body, principal = body_and_axes
     beyond = _root(sum(value * value for row in principal.left for value in row))
     tensor = _root(sum(value * value for row in body.tensor for value in row))
@@ -184,7 +184,7 @@ def _field_error(
 
 
 def _root(square: Any) -> Fraction:
-    """Not less than the root of a rational, and at most 2^-30 larger relatively; 0 for 0."""
+    """An upper bound of the root of a rational, at most 2^-30 too large relatively; 0 for 0."""
     value = Fraction(square)
     if value == 0:
         return value

@@ -16,9 +16,9 @@ from heavytop.top.heavy_top import HeavyTop, State
 
 
 class ExactSolution(Protocol):
-    """A motion known at any time to any number of bits.
+    """A motion that can be evaluated at any time to any number of bits.
 
-    method: the closed form or the enclosure behind it, for reports.  source: where its formulas are published.
+    method: the closed form or the enclosure behind it, for reports.  source: the publication of its formulas.
     """
 
     @property
@@ -47,16 +47,16 @@ class ExactSolution(Protocol):
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
         """Six power series in ε, the motion at ``time`` + ε up to ε^(length − 1).
 
-        Evaluated from the closed form (or the enclosure) itself, with t + ε in the place of t: substituted into the
-        field they give the residual.  Bits as for :meth:`state`, for the coefficient of ε^0.
+        The closed form (or the enclosure) is evaluated with t + ε for t; substituted into the field they give the
+        residual.  The coefficient of ε^0 has ``bits`` bits as :meth:`state`.
         """
         ...
 
 
-# Exact conditions on body and start: rational quantities that vanish in a class of motions, or do not.
+# Exact conditions on body and start: rational quantities that do or do not vanish in a class of motions.
 #
-# A class of motions names them once, ``body`` and ``starts``; its constructor tests them, the catalogue finds the class
-# by them (:mod:`heavytop.exact.catalogue`), and :func:`heavytop.exact.catalogue.table` writes them down.
+# A class of motions lists them once, as ``body`` and ``starts``.  Its constructor tests them, the catalogue finds the
+# class by them (:mod:`heavytop.exact.catalogue`), and :func:`heavytop.exact.catalogue.table` lists them.
 
 
 def vanish(values: Sequence[Fraction]) -> bool:
@@ -73,8 +73,8 @@ def positive(values: Sequence[Fraction]) -> bool:
 class ExactRelation:
     """A relation between exact data of a top and a start.
 
-    text: the relation as it is written, ``I1 = I2 = 2 I3``.  names: what is tested, separated by commas, ``I1 - I2,
-    I1 - 2 I3``; one name may stand for a vector.  values: of these.  test: what they satisfy.
+    text: the relation, ``I1 = I2 = 2 I3``.  names: of the tested quantities, ``I1 - I2, I1 - 2 I3``; one name may be
+    that of a vector.  values: of these quantities.  test: the predicate that they satisfy.
     """
 
     text: str
@@ -98,7 +98,7 @@ Conditions = tuple[ExactRelation, ...]
 
 
 def hold(conditions: Iterable[ExactRelation], top: HeavyTop, start: State) -> bool:
-    """Whether all hold; none is evaluated after the first that does not."""
+    """Whether all conditions hold; stops at the first that does not."""
     return all(condition.holds(top, start) for condition in conditions)
 
 
@@ -113,7 +113,7 @@ def require(name: str, conditions: Iterable[ExactRelation], top: HeavyTop, start
 
 
 def apart(motion: ExactSolution, top: HeavyTop, start: State) -> list[Fraction]:
-    """The top and start of a known motion less these, number by number."""
+    """The differences of the numbers of a motion's top and start from these."""
     known, given = ((*t.inertia, t.weight, *t.centre, *s.flat) for t, s in ((motion.top, motion.start), (top, start)))
     return [a - b for a, b in zip(known, given, strict=True)]
 
@@ -132,7 +132,7 @@ def plane_top(ratio: int) -> Conditions:
 
 
 def equilibrium(system: System) -> ExactRelation:
-    """All six rates of change are 0."""
+    """The relation that all six rates of change are 0."""
     return ExactRelation(
         "Omega' = gamma' = 0",
         "their components",

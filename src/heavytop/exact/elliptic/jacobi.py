@@ -11,7 +11,7 @@ and for larger m, by Jacobi's imaginary transformation, with the complementary n
 So the nome never exceeds 0.15.  Where it is 0 the thetas are sin πz, cos πz, 1, 1 (the common factor 2 q^(1/4)
 of θ1 and θ2 cancels everywhere): circular functions at m = 0, hyperbolic ones at m = 1.
 For larger m arguments are reduced modulo 2K before anything is evaluated.  DLMF 22.2.4-22.2.6, 20.7(viii).
-Numbers are put into the series of :mod:`heavytop.exact.elliptic.weierstrass`, power series into FLINT's own theta
+Numbers are evaluated by the series of :mod:`heavytop.exact.elliptic.weierstrass`, power series by FLINT's theta
 functions.
 """
 
@@ -40,9 +40,9 @@ class Jacobi:
     scale: z = scale · u.
     tau: the ratio of the periods for the theta functions; None where the nome is 0.
     null: θ2, θ3, θ4 at 0.
-    period: 2K and the reach of a reduced argument; None where none needs reducing.
-    theta: their series for numbers, hyperbolic for large m.  parts: the polynomials of sn, cn, dn and of what they are
-    divided by, the null values among the coefficients.
+    period: 2K and the largest reduced argument; None where arguments need no reduction.
+    theta: their series for numbers, hyperbolic for large m.  parts: the polynomials of the numerators of sn, cn, dn and
+    of their denominator, with the null values in the coefficients.
     """
 
     parameter: arb
@@ -56,7 +56,7 @@ class Jacobi:
     parts: tuple[arb_poly, arb_poly, arb_poly, arb_poly]
 
     def reduced(self, u: BallLike) -> tuple[Any, int]:
-        """(u − 2nK, n) with |u − 2nK| at most about K; n = 0 where no series needs it."""
+        """(u − 2nK, n) with |u − 2nK| at most about K; n = 0 where no reduction is needed."""
         if self.period is None:
             return u, 0
         turns = nearest_integer(constant(u) / self.period[0])
@@ -95,12 +95,12 @@ class Jacobi:
 
 @dataclass(frozen=True, slots=True)
 class Wave:
-    """θ1(u + i·shift) over the denominator of sn, for real u, up to a constant: it has no pole there, and no zero.
+    """θ1(u + i·shift) over the denominator of sn, for real u, up to a constant: it has neither poles nor zeros there.
 
     Its logarithm has the derivative of an elliptic function with simple poles of residue ± 1/2 at ∓ i·shift, up to a
     constant and a real part.  Made by :func:`wave`.
-    real, imaginary: the polynomials of θ1 that go with cos x and sin x.  period: the argument of the factor, of
-    modulus 1, that it takes over 2K.
+    real, imaginary: the polynomials of θ1 times cos x and sin x.  period: the argument of its factor, of modulus 1,
+    over 2K.
     """
 
     functions: Jacobi
@@ -110,7 +110,7 @@ class Wave:
     period: arb
 
     def at(self, u: BallLike) -> tuple[Any, arb]:
-        """The value at u reduced by n periods, a number or a series, and the angle n · period it is to be turned by."""
+        """The value at u reduced by n periods, a number or a series, and the angle n · period of the missing factor."""
         reduced, turns = self.functions.reduced(u)
         return self._number(reduced) if isinstance(reduced, arb) else self._series(reduced), turns * self.period
 
@@ -163,9 +163,9 @@ def legendre_f(sine2: arb, cosine2: arb, delta2: arb) -> arb:
 
 
 def jacobi(parameter: arb, complement: arb) -> Jacobi:
-    """The functions of parameter m = ``parameter``, with 1 − m given beside it, 0 ≤ m ≤ 1.
+    """The functions of parameter m = ``parameter`` and ``complement`` = 1 − m, 0 ≤ m ≤ 1.
 
-    A limit is taken where m or 1 − m is an exact 0, so both come from exact tests.
+    They are limits where m or 1 − m is an exact 0, which exact tests decide.
     """
     half_pi = arb.pi() / 2
     along: Any

@@ -1,6 +1,6 @@
-"""x'² = f(x), any real quartic f, from any start, and the functions that turn along with such a motion.
+"""x'² = f(x) for any real quartic f and any start, and functions of the second kind beside such a motion.
 
-Two theorems carry every elliptic motion of the suite.  Write f = a0x⁴ + 4a1x³ + 6a2x² + 4a3x + a4, c = f''(x0)/24,
+Every elliptic motion of the suite rests on two theorems.  Write f = a0x⁴ + 4a1x³ + 6a2x² + 4a3x + a4, c = f''(x0)/24,
 f' = f'(x0) and so on, y0 = x'(0), ℘ with the invariants of f, and D(t) = 2 (℘(t) − c)² − f f''''/48.
 
 1. Biermann-Weierstrass (Whittaker & Watson, A Course of Modern Analysis, 20.6, example 2):
@@ -12,13 +12,13 @@ f' = f'(x0) and so on, y0 = x'(0), ℘ with the invariants of f, and D(t) = 2 (�
 factors over the periods as Φ(t) = σ(V − t) e^(ζ(V) t)/(σ(V) σ(t)) does.  Then e^(−iκt) F D has no pole but one of order
 four at t = 0, so it is a combination of Φ, Φ', Φ'', Φ''' (Hermite's theorem on functions of the second kind;
 Halphen, Traité des fonctions elliptiques, I).
-Φ = 1/t − P t/2 + P' t²/6 + ..., P = ℘(V), and so the combination is known from f_k, the derivatives of e^(−iκt) F at 0:
+Φ = 1/t − P t/2 + P' t²/6 + ..., P = ℘(V), and so the combination follows from f_k, the derivatives of e^(−iκt) F at 0:
 
     F = e^(iκt) [ (f3/3 − 4c f1) Φ + (4c f0 − f2) Φ' + f1 Φ'' − f0 Φ'''/3 ] / D
     Φ'/Φ = ½ (℘' + P')/(℘ − P),    Φ'' = (2℘ + P) Φ    (Lamé's equation)
 
-Nothing is divided by anything that depends on the start, so turning points, double roots and rest are starts like any
-other.
+No formula divides by a quantity that depends on the start, so turning points, double roots and rest need no special
+case.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ Pair = tuple[Fraction, Fraction]
 class QuarticMotion:
     """The motion x'² = f(x) from x(0) = start, x'(0) = speed.
 
-    coefficients: of 1, x, x², x³, x⁴ (fewer for a lower degree).  speed² = f(start) is the caller's promise.
-    x must stay finite for all real times that are asked for, else the result is not finite.
+    coefficients: of 1, x, x², x³, x⁴ (fewer for a lower degree).  The caller ensures speed² = f(start).
+    The result is not finite at times where x is not.
     """
 
     coefficients: tuple[Fraction, ...]
@@ -87,7 +87,7 @@ class QuarticMotion:
         return bool(self.speed == 0 and self.derivatives()[1] == 0)
 
     def prepared(self) -> PreparedMotion:
-        """Everything that does not depend on time, at the working precision."""
+        """All constants of the motion at the working precision."""
         value, first, second, third, fourth = self.derivatives()
         centre, lattice = second / 24, self.lattice()
         number: Any = as_ball if isinstance(lattice, Lattice) else lambda exact: exact
@@ -105,7 +105,7 @@ class QuarticMotion:
 class PreparedMotion:
     """A :class:`QuarticMotion` at one working precision: lattice, c, f f''''/48, x0 and its numerators.
 
-    On discriminant 0 the numbers stay as exact as they were.
+    On discriminant 0 the numbers stay exact.
     """
 
     lattice: AnyLattice
@@ -116,7 +116,7 @@ class PreparedMotion:
     at_rest: bool
 
     def denominator(self, point: Point) -> Any:
-        """D T⁴; on discriminant 0 by its exact coefficients, of which the first vanishes where f is a square."""
+        """D T⁴; on discriminant 0 from exact coefficients, of which the first vanishes where f is a square."""
         square = point.square
         if isinstance(self.lattice, DegenerateLattice):
             shift: Any = difference(self.lattice.double, self.centre)
@@ -126,7 +126,7 @@ class PreparedMotion:
         return above * above * 2 - square * square * as_ball(self.offset)
 
     def numerator(self, point: Point) -> Any:
-        """(x − x0) D T⁴: beside :meth:`denominator`, what is left of x where it is infinite."""
+        """(x − x0) D T⁴, finite where x is infinite."""
         if self.at_rest:
             return point.scale * 0
         constant, even, odd = self.numerators
@@ -169,7 +169,7 @@ class PreparedMotion:
         return tuple(factor.real if factor.imag.is_zero() else factor for factor in factors)
 
     def _elementary(self, lattice: DegenerateLattice, winding: Winding, taylor: Sequence[Pair]) -> Factors:
-        """The combination on discriminant 0, in powers of T; what cancels at large T cancels here, exactly."""
+        """The combination on discriminant 0, in powers of T; terms that cancel at large T cancel here, exactly."""
         double: Any = lattice.double
         centre: Any = self.centre
         value, root = winding.value, ball(winding.square).sqrt()
@@ -192,7 +192,7 @@ Factors = tuple[Any, ...]
 
 @dataclass(frozen=True, slots=True)
 class Companions:
-    """Several F with the same winding, ready for evaluation.  still: all are 0."""
+    """Several F with the same winding, prepared for evaluation.  still: all are 0."""
 
     wave: SecondKind
     factors: tuple[Factors, ...]
@@ -205,7 +205,7 @@ class Companions:
         phi, slope = map(lift, self.wave.at(point))
         factor = lift(inverse)
         phi, slope, square = phi * factor, slope * factor, lift(point.square)
-        # a complex ball times a real one is quick in this order only
+        # a complex ball times a real one is fast in this order only
         low, steep = phi * lift(point.scale), phi * lift(point.slope)
         if isinstance(self.wave.lattice, DegenerateLattice):
             slope_part = slope

@@ -6,10 +6,10 @@ two are complex, z = u/(2ω) and T(u) = 2ω θ1(z)/θ1'(0), everything is a thet
 
     ℘ = e1 + (θ2(z)/(θ2(0) T))²,   ℘' = −2 θ2(z)θ3(z)θ4(z)/(θ2(0)θ3(0)θ4(0) T³),   σ = T exp(η u²/(2ω))
 
-:class:`Point` holds T, ℘ T² and ℘' T³, which stay finite at the poles of ℘, so that no formula built on it breaks down
-at t = 0 or at a whole period.  On discriminant 0 (a double root d) T is sinh(κu)/κ with κ² = 3d, or its trigonometric
-or rational form, and nothing is left of theta functions.  Near it they converge all the faster, after the modular
-transformation that FLINT makes, and only the roots' difference costs working precision.
+:class:`Point` holds T, ℘ T² and ℘' T³, which stay finite at the poles of ℘, so that formulas built on it hold at t = 0
+and at whole periods.  On discriminant 0 (a double root d) T is sinh(κu)/κ with κ² = 3d, or its trigonometric or
+rational form, without theta functions.  Near it theta functions converge faster, after FLINT's modular
+transformation, and only the difference of the roots costs working precision.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from heavytop.exact.flint.balls import BallLike, Balls, ball, current_precision,
 #
 # so the Fourier series of the thetas (DLMF 20.2.1-20.2.4) are polynomials in c times 1, sin x or cos x.  On the
 # imaginary axis sin, cos become i sinh, cosh and nothing else changes.  Their coefficients fall like q^(n²): few terms
-# are left.
+# suffice.
 #
 # Tail: |U_n ± U_(n−1)|, |T_n| ≤ (2n + 1) g^n where |e^(2ix)| ≤ g, 1/g ≤ |e^(2ix)|.  If the weights are at most
 # q^(n²) w^n, the terms from n = N on are below b_N = (2N + 1) q^(N²) (g w)^N and fall at least by the factor
@@ -50,7 +50,7 @@ class Theta:
 
     square: q², of either sign (q imaginary where the half-periods' ratio has the real part 1/2).
     rate: x = rate · u at the real argument u, and x = i rate · u where ``hyperbolic``.
-    growth: g, an upper bound of |e^(±2ix)|, for all arguments that will be asked for.
+    growth: g, an upper bound of |e^(±2ix)| for all arguments.
     """
 
     square: arb
@@ -100,7 +100,7 @@ class Theta:
         return total + (acb_poly([acb(tail, tail)]) if isinstance(total, acb_poly) else arb_poly([tail]))
 
     def _enough(self, wide: Any) -> tuple[int, arb]:
-        """N, and the ball around 0 with the sum of all terms from n = N on; not finite where nothing is known."""
+        """N, and a ball around 0 that contains the sum of all terms from n = N on; not finite without a bound."""
         smallest = arb(2) ** (-current_precision() - 8)
         with working_precision(64):
             nome, growth = abs(self.square).sqrt(), self.growth * wide
@@ -143,7 +143,7 @@ class Point:
     slope: ℘' T³.
     thetas: (−1)^(whole periods) and θ_j(z)/θ_j(0), j = 2, 3, 4 (none on discriminant 0); where two roots are complex
     and z is not reduced, the product of the last two and 1.
-    time, z: u and u/(2ω) reduced, or sin, cos and cos 2· of πz where nothing was reduced.
+    time, z: u and u/(2ω) reduced, or sin, cos and cos 2· of πz without a reduction.
     """
 
     scale: BallLike
@@ -246,7 +246,7 @@ class DegenerateLattice:
         return sine * (1 / rate), cosine
 
     def point(self, time: Exact, length: int = 0) -> Point:
-        """As :meth:`Lattice.point`."""
+        """:class:`Point` at a real time, as :meth:`Lattice.point` returns it."""
         u: BallLike = arb_series([ball(time), 1], length) if length else ball(time)
         scale, cosine = self.functions(u)
         one = u * 0 + 1
@@ -288,8 +288,8 @@ def imag(value: Any) -> BallLike:
 def from_invariants(g2: Scalar, g3: Scalar) -> AnyLattice:
     """The lattice of ℘'² = 4℘³ − g2 ℘ − g3 at the working precision.
 
-    Exact invariants: any, the sign of the discriminant g2³ − 27 g3² is decided exactly.  Balls: raises OutOfReach where
-    they do not decide it.
+    The sign of the discriminant g2³ − 27 g3² of exact invariants is decided exactly; raises OutOfReach for balls that
+    do not decide it.
     """
     if not isinstance(g2, arb) and not isinstance(g3, arb):
         return exact_lattice(Fraction(g2), Fraction(g3), current_precision())
@@ -397,7 +397,7 @@ def _with_thetas(roots: tuple[acb, acb, acb], half: arb, ratio: acb) -> Lattice:
     return Lattice(roots, half, ratio, zero, quasi_period, theta, parts)
 
 
-# e^(iκt) Φ(t), Φ(t) = σ(V − t) e^(ζ(V) t)/(σ(V) σ(t)): what turns along with an elliptic motion, as balls.
+# e^(iκt) Φ(t), Φ(t) = σ(V − t) e^(ζ(V) t)/(σ(V) σ(t)), as balls.
 #
 # A doubly periodic function of the second kind (Hermite): over the periods it takes constant factors.  Lamé's equation
 # is Φ'' = (2℘ + ℘(V)) Φ, and Φ'/Φ = ½ (℘' + ℘'(V))/(℘ − ℘(V)).
@@ -405,7 +405,7 @@ def _with_thetas(roots: tuple[acb, acb, acb], half: arb, ratio: acb) -> Lattice:
 
 @dataclass(frozen=True, slots=True)
 class Winding:
-    """A function of the second kind: ℘(V) = value, ℘'(V) = i slope √square, turning besides with κ = rate √square.
+    """A function of the second kind: ℘(V) = value, ℘'(V) = i slope √square, and a factor with κ = rate √square.
 
     All exact.  value is real and slope real, so that V is imaginary, or imaginary plus a real half-period; slope 0
     means that V is a half-period.
@@ -419,7 +419,7 @@ class Winding:
 
 @dataclass(frozen=True, slots=True)
 class SecondKind:
-    """e^(iκt) Φ(t) ready for evaluation.
+    """e^(iκt) Φ(t) prepared for evaluation.
 
     winding: its V and κ.  shift: V/(2ω).  unit: θ1(shift).  rate: θ1'/θ1(shift)/(2ω) + iκ, the whole exponent.
     index: of the half-period that V is, in the order of the lattice's roots, or None.
@@ -500,10 +500,10 @@ def _wave_parts(lattice: Lattice, shift: acb) -> tuple[arb_poly, ...]:
 
 
 def _imaginary_argument(lattice: Lattice, winding: Winding) -> acb:
-    """V with ℘(V) = value on the imaginary axis, or beside it by ω; the sign of Im V follows ℘'(V).
+    """V with ℘(V) = value on the imaginary axis, or on that axis shifted by ω; the sign of Im V follows ℘'(V).
 
-    ℘(iy; g2, g3) = −℘(y; g2, −g3) (DLMF 23.10(iv)), and y is Carlson's R_F (DLMF 19.25.35).  Beyond e3 ℘(V − ω) is
-    taken, by the addition theorem, DLMF 23.10.1.
+    ℘(iy; g2, g3) = −℘(y; g2, −g3) (DLMF 23.10(iv)), and y is Carlson's R_F (DLMF 19.25.35).  Beyond e3 the
+    addition theorem, DLMF 23.10.1, gives ℘(V − ω).
     """
     value, (e1, e2, e3) = acb(ball(winding.value)), lattice.roots
     shifted = e2.imag == 0 and (value - e3).real > 0

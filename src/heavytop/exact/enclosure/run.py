@@ -1,15 +1,15 @@
 """Enclosure of any motion of either system, by Taylor series with a proven tail: no closed form is needed.
 
-A motion is enclosed in its own units, powers of two, in which |ω| ≤ 4 at all times
+A motion is enclosed in scaled units, powers of two, in which |ω| ≤ 4 at all times
 (:class:`heavytop.multiword.problem.Scaled`).
 
 The step and its theorem are in :mod:`heavytop.exact.enclosure.step`.  Its coefficients are computed in words
-(:mod:`heavytop.multiword.fixed_point.certified_series`), as far as there are words, or in exact integers where a few
-steps would not be worth the machine code.  Here the working precision is chosen so that the asked bits come out: the
-bits that the motion loses are measured on a pilot run, and carried on linearly to the time asked for; where the pilot's
-bits do, it is the run asked for.  Later it falls, as bits are lost (:class:`EnclosureRun`).
-Precisions come from a schedule, and steps and falls depend on the node that they start from alone, so a ball does not
-depend on what was asked before; what was computed before is only found faster.
+(:mod:`heavytop.multiword.fixed_point.certified_series`) up to the largest grid, or in exact integers where few steps
+would not pay for the machine code.  This file chooses the working precision that leaves the requested bits: a pilot run
+measures the bits that the motion loses, and they are extrapolated linearly to the requested time; where the bits of the
+pilot suffice, it is the requested run.  The precision falls as bits are lost (:class:`EnclosureRun`).
+Precisions come from a schedule, and steps and falls depend on their node alone, so a ball does not depend on earlier
+requests, which only make it faster.
 
 Reach on the generic top of the tests (I = (3, 2, 1), P r = (1/2, 1/3, 1/5)), seconds of one core that was shared:
 60 digits at t = 8 in 0.02 s; 30 digits at t = 100 in 0.1 s, at t = 1000 in 1.5 s; about 0.17 bits are lost a unit of
@@ -64,11 +64,11 @@ from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 
-# Steps of an enclosure one after another, and the pilot that tells how many bits a motion loses.
+# The sequence of steps of an enclosure, and the pilot that measures how many bits a motion loses.
 
 
 FAR = Fraction(10**12)
-"""More times as far is not asked of a forecast."""
+"""A forecast extrapolates at most so many times beyond the pilot."""
 _PILOT_STEPS = 1000
 _KEPT_NODES = 512
 _TRIED, _SETTLED = 25, 100
@@ -85,14 +85,14 @@ class Fall(NamedTuple):
 
 @dataclass(slots=True)
 class EnclosureRun:
-    """Nodes of one motion from time 0 on as far as they were asked for, at ``precision`` bits or, later, at fewer.
+    """Nodes of one motion from time 0 up to the latest request, at ``precision`` bits or, later, at fewer.
 
-    What a motion amplifies makes the last bits of an enclosure worthless: those more than :data:`_GUARD` below its
-    radius are rounded away where that makes the steps cheaper.  The set of errors is wider by what is rounded, so that
-    the guard bears on no proof, only on the radius.  What is large now need not be what grows later: on the generic
-    top of the tests, in 528 bits to t = 2000, 157 bits are left with 48 guard bits or without a fall, 146 with 32.
+    The bits of an enclosure more than :data:`_GUARD` below its radius carry no information: they are rounded away where
+    that makes the steps cheaper.  The set of errors is widened by the rounding, so that the guard affects the radius
+    but no proof.  Errors that are large now need not be those that grow later: on the generic top of the tests, in 528
+    bits to t = 2000, 157 bits are left with 48 guard bits or without a fall, 146 with 32.
 
-    Any thread may ask: a node depends on its time alone, and what is remembered is replaced, never changed in place.
+    Safe in threads: a node depends on its time alone, and cached tuples are replaced, never changed in place.
     """
 
     motion: ScaledMotion
@@ -121,11 +121,11 @@ class EnclosureRun:
             node, taken = self.after(taken), None
 
     def step(self, node: Node) -> Step | None:
-        """From one of its nodes; None where the errors are too large."""
+        """The step from one of its nodes; None where the errors are too large."""
         return step(self.motion.field, node, *self._arithmetic(node.time))
 
     def lost(self, node: Node) -> float:
-        """Bits lost of those that it began with, at a node."""
+        """Bits lost at a node, of those at the beginning."""
         return self.precision - self._arithmetic(node.time)[0] + node.errors.bits
 
     def _arithmetic(self, time: Fraction) -> tuple[int, CertifiedSeries | None]:
@@ -133,7 +133,7 @@ class EnclosureRun:
         return self.falls[passed - 1][1:] if passed else (self.precision, self.certified)
 
     def after(self, taken: Step, transfer: tuple[Matrix, Matrix, float] | None = None) -> Node:
-        """The node at the end of a step, remembered; in fewer bits where that is time."""
+        """The node at the end of a step, in fewer bits where the last ones carry no information; it is stored."""
         precision = self.motion.fewer(taken.precision, taken.node.errors.bits)
         node = taken.end(transfer, taken.precision - precision)
         if precision < taken.precision and (not self.falls or self.falls[-1].time < node.time):
@@ -142,7 +142,7 @@ class EnclosureRun:
         return node
 
     def _nearest(self, time: Fraction) -> tuple[Step | None, Node]:
-        """The last node known before ``time``, and the step from it where that is known too."""
+        """The last stored node before ``time``, and the step from it where that is stored too."""
         last, nodes = self.last, self.nodes
         node = nodes[bisect_right(nodes, time, key=lambda node: node.time) - 1]
         if last is not None and node.time <= last.node.time <= time:
@@ -150,7 +150,7 @@ class EnclosureRun:
         return None, node
 
     def keep(self, node: Node) -> None:
-        """Remember every ``stride``-th node: constant memory at any horizon."""
+        """Store every ``stride``-th node, in constant memory at any horizon."""
         nodes = self.nodes
         if node.time <= nodes[-1].time:
             return
@@ -165,7 +165,7 @@ class EnclosureRun:
 
 
 class Ahead(NamedTuple):
-    """How far a pilot came: the node at its end, and the time and the bits lost after each of its steps."""
+    """The last node of a pilot, and the time and the bits lost after each of its steps."""
 
     node: Node
     times: tuple[Fraction, ...] = ()
@@ -174,21 +174,20 @@ class Ahead(NamedTuple):
 
 @dataclass(slots=True)
 class Pilot:
-    """The run in the fewest bits that may do: it tells how many bits the motion loses and how many steps it takes.
+    """A run in few bits that measures how many bits the motion loses and how many steps it takes.
 
-    Where those bits do, its nodes are those of the enclosure.  Any thread may ask: ``ahead`` is replaced as a whole by
-    one that goes further, and does not depend on who came how far.
+    Where those bits suffice, its nodes are those of the enclosure.  Safe in threads: ``ahead`` is replaced as a whole
+    by a longer one, whose values do not depend on the thread.
     """
 
     run: EnclosureRun
     ahead: Ahead
 
     def forecast(self, span: Fraction, hopeless: Callable[[float, float], bool]) -> tuple[float, float]:
-        """(bits lost, steps taken) up to ``span``, carried on linearly where the pilot does not go.
+        """(bits lost, steps taken) up to ``span``, extrapolated linearly beyond the pilot.
 
-        hopeless: whether so many bits lost, of those that will be, and so many steps are; then the pilot goes no
-        further.  It is asked after every 25 steps, and up to 100 of a part of the steps only, a quarter after 25: the
-        first ones may be short.
+        hopeless: whether the pilot shall stop at so many bits lost so far and so many steps in all.  It is called after
+        every 25 steps; up to 100 it is called with a share of the steps, a quarter after 25, as the first may be short.
         """
         times, losses = self._ahead(span, hopeless)
         if not times:
@@ -199,7 +198,7 @@ class Pilot:
     def _ahead(
         self, span: Fraction, hopeless: Callable[[float, float], bool]
     ) -> tuple[Sequence[Fraction], Sequence[float]]:
-        """The times and the bits lost as far as ``span``, where the pilot comes so far."""
+        """The times and the bits lost up to ``span``, or up to the end of the pilot."""
         node, known_times, bits = self.ahead
         if known_times and known_times[-1] >= span:
             return known_times, bits
@@ -209,7 +208,7 @@ class Pilot:
             part = min(1.0, count / _SETTLED)
             if count and count % _TRIED == 0 and hopeless(losses[-1], part * count * _times_as_far(span, times[-1])):
                 break
-            proven = run.last = run.step(node)  # it may cover the time that is asked for
+            proven = run.last = run.step(node)  # it may cover the requested time
             if proven is None:
                 break
             node = run.after(proven)
@@ -221,14 +220,14 @@ class Pilot:
         return times, losses
 
     def reaches(self, span: Fraction, bits: int) -> bool:
-        """Whether it has come as far and has as many bits left there."""
+        """Whether the pilot has reached ``span`` with ``bits`` bits left."""
         _, times, losses = self.ahead
         index = bisect_left(times, span)
         return index < len(times) and self.run.precision - losses[index] >= bits
 
 
 def _carried_on(times: Sequence[Fraction], losses: Sequence[float], index: int, span: Fraction) -> float:
-    """The bits lost by ``span``: by the step ``index``, and from there as by the later half of the steps before it."""
+    """The bits lost at ``span``: those at step ``index``, extrapolated by the later half of the steps before it."""
     later = min(span, FAR * times[index]) - times[index]
     if later <= 0:
         return losses[index]
@@ -242,19 +241,19 @@ def _times_as_far(span: Fraction, reached: Fraction) -> float:
     return max(1.0, float(min(span / reached, FAR)))
 
 
-# A motion in units in which it is of ordinary size, and the arithmetic that carries its Taylor coefficients.
+# A motion in scaled units, and the arithmetic of its Taylor coefficients.
 
 
 _GRIDS = tuple(grid_of(words, whole=True) for words in (3, 4, 6, 7, 8, 10, 12, 16, 24, 28, 32, 36, 40, 45))
-"""Few of those that there are: each is compiled at its first use."""
+"""A selection of grids, as each is compiled at its first use."""
 _STEPS_A_WORD = 2
-"""Fewer steps than that are not worth the machine code."""
+"""Fewer steps do not pay for the machine code."""
 _GUARD = 64
-"""Bits below the errors that are kept: binary64, which carries their frames, blurs them by 2^-46 or so anyway."""
+"""Bits kept below the errors; binary64, which holds their frames, blurs them by 2^-46 or so."""
 _FEWEST = 352
 """Bits below which fewer save less than the machine code of another grid costs."""
 _PLACES = 8
-"""At which the model of the cost looks at the working precision."""
+"""Times at which the model of the cost evaluates the working precision."""
 _LARGEST_EXCESS = 8
 _seen_right: set[tuple[Grid, str, int]] = set()
 
@@ -263,9 +262,9 @@ _seen_right: set[tuple[Grid, str, int]] = set()
 class ScaledMotion:
     """A motion from exact data in one direction of time.
 
-    field: of the scaled state, backwards in time with its sign changed.  in_words: whether the lanes of
-    :mod:`heavytop.multiword.codegen.recurrence` compute this field, proven over the rationals, with coefficients of
-    ordinary size; a state that stays is cheaper in integers.
+    field: of the scaled state, with its sign changed backwards in time.  in_words: whether the lanes of
+    :mod:`heavytop.multiword.codegen.recurrence` compute this field, which is proven over the rationals, with
+    coefficients of moderate size; a constant state is cheaper in integers.
     """
 
     scaled: Scaled
@@ -302,7 +301,7 @@ class ScaledMotion:
         return cls(scaled, motion, forwards, in_words)
 
     def precision(self, bits: float, steps: float) -> tuple[int, bool]:
-        """The working precision at or above ``bits`` for so many steps, and whether it is that of words."""
+        """The working precision at or above ``bits`` for so many steps, and whether it is computed in words."""
         if self.in_words:
             for grid in _GRIDS:
                 if grid.total >= bits:
@@ -315,7 +314,7 @@ class ScaledMotion:
         return -(-needed // unit) * unit, False
 
     def fewer(self, precision: int, lost: float) -> int:
-        """The working precision that is enough where the last ``lost`` bits of ``precision`` are within the errors."""
+        """The working precision that suffices where the last ``lost`` bits of ``precision`` are within the errors."""
         needed = precision - lost + _GUARD
         return precision if needed > precision else min(precision, self.precision(max(needed, _FEWEST), inf)[0])
 
@@ -324,22 +323,22 @@ class ScaledMotion:
         return None if self.grid(precision) is None else self.certified(precision)
 
     def grid(self, precision: int) -> Grid | None:
-        """That of so many bits; None where absent."""
+        """The grid of ``precision`` bits; None where there is none."""
         return next((grid for grid in _GRIDS if self.in_words and grid.total == precision), None)
 
     def seconds(self, planned: tuple[int, bool], lost: float, steps: float) -> float:
-        """Seconds by the model of the cost, where ``lost`` bits are lost evenly on so many steps."""
+        """Seconds by the model of the cost, where ``lost`` bits are lost evenly over the steps."""
         begun, in_words = planned
         precisions = [self.fewer(begun, lost * i / _PLACES) for i in range(_PLACES)]
         words = [in_words if p == begun else self.grid(p) is not None for p in precisions]
         return steps / _PLACES * sum(map(seconds_a_step, precisions, words))
 
     def seconds_for(self, bits: float, lost: float, steps: float) -> float:
-        """Seconds by the model, where ``bits`` are to be left."""
+        """Seconds by the model of the cost, where ``bits`` bits are left."""
         return self.seconds(self.precision(bits + lost, steps), lost, steps)
 
     def certified(self, precision: int) -> CertifiedSeries:
-        """The Taylor coefficients in ``precision`` bits, one of those that words have."""
+        """The Taylor coefficients on the grid of ``precision`` bits."""
         if precision not in self._certified:
             grid = self.grid(precision)
             assert grid is not None
@@ -349,7 +348,7 @@ class ScaledMotion:
         return self._certified[precision]
 
     def _require_right(self, certified: CertifiedSeries) -> None:
-        """The first step that machine code takes in this process is compared with exact integers."""
+        """Compare the first step of machine code in this process with exact integers."""
         grid, size = certified.grid, len(self.scaled.state)
         key = (grid, self.scaled.system.name, size)
         if key in _seen_right:
@@ -378,11 +377,11 @@ def own_parameters(scaled: Scaled, p: Parameters) -> Parameters:
 
 _PILOT_BITS = 128
 _PILOT_ROOM = 72
-"""The forecast for a motion such as the generic top of the tests to t = 100: its pilot is the enclosure itself."""
+"""Bits that the generic top of the tests loses to t = 100: up to there the pilot is the enclosure."""
 _MOST_PILOT_BITS = 352
 _HOPELESS, _SURELY = 8, 1.25
-"""Times the effort, and times what a cost may be, beyond which a pilot is abandoned after a hundred steps; after 25 it
-is four times as much."""
+"""Factors of the effort, and of the largest cost, beyond which a pilot is abandoned after a hundred steps; after 25
+steps they are four times as large."""
 _LARGEST_RATE = 2**100
 _ATTEMPTS = 6
 EFFORT = 900.0
@@ -390,7 +389,7 @@ EFFORT = 900.0
 
 
 def seconds_a_step(precision: int, in_words: bool) -> float:
-    """A model of the cost, not a measurement: what is refused must not depend on how busy the machine is."""
+    """The model of the cost of a step: a refusal must not depend on the load of the machine."""
     return 4e-4 + 1.2e-11 * precision**3 if in_words else 1e-3 + 6e-8 * precision**2
 
 
@@ -403,9 +402,9 @@ class Validated:
 
     top, start, system: any.  rotor: λ of the gyrostat where the start is rounded and (2.1) no longer holds exactly;
     None for P b/(M·γ).  xi: the attitude vector at time 0; None for :func:`heavytop.top.attitude.perpendicular`.
-    uncertainty: what the data lack; the motion enclosed is the true one.  None for exact data.
-    effort: what a request may cost, in seconds of the cost model; beyond it the request is refused.
-    level: the class that has the motion but not its level, the level and the distance from it; "" for none.
+    uncertainty: bounds of the error of the data, which the enclosure includes.  None for exact data.
+    effort: the largest cost of a request, in seconds of the cost model; beyond it the request is refused.
+    level: a class that has the motion but not its level, with the level and the distance from it; "" for none.
     unit: the motion changes at about the rate 2^unit (:func:`heavytop.exact.flint.balls.unit_of_time`).
     Raises InputError where the system does not admit the top and start, OutOfReach where they are too large.
     """
@@ -459,20 +458,20 @@ class Validated:
     def cost(self, time: Fraction, bits: int, most: float | None = None) -> float:
         """Seconds of the model of the cost that the state at ``time`` takes: steps times bits, by no clock.
 
-        most: where it is a quarter more than this, the first steps may tell; None for eight times the effort.
+        most: a pilot ends early where the cost exceeds this by a quarter; None for eight times the effort.
         """
         return 0.0 if time == 0 else self._cost(time, bits, self.start.flat, most=most)
 
     def reached(self) -> Fraction:
-        """The |t| up to which the latest enclosure has come, for those who wait; any thread may ask."""
+        """The |t| that the latest enclosure has reached, for displays of progress; safe in threads."""
         latest = next(reversed(list(self._runs.values())), None)
         return Fraction(0) if latest is None else latest.nodes[-1].time / Fraction(2) ** self.unit
 
     def walk(self, time: Fraction, bits: int) -> tuple[ScaledMotion, Iterator[Step]]:
         """The units of the motion, and its proven steps from t = 0 until one covers ``time``, which is not 0.
 
-        Their working precision is that at which ``bits`` bits are expected to be left at ``time``; they end before it
-        where the errors grow too large.  Raises OutOfReach as :meth:`state` does.
+        At their working precision ``bits`` bits are expected to be left at ``time``; the steps end before it where the
+        errors grow too large.  Raises OutOfReach as :meth:`state` does.
         """
         direction = 1 if time > 0 else -1
         motion = self._motion(direction, self.start.flat)
@@ -507,17 +506,17 @@ class Validated:
             return solved(values, lambda y: self.system.field(parameters, y))
 
     def motion(self, direction: int) -> ScaledMotion:
-        """That of (Ω, γ) in units of its own, forwards or backwards in time."""
+        """The motion of (Ω, γ) in scaled units, forwards or backwards in time."""
         return self._motion(direction, self.start.flat)
 
     def forecast(self, time: Fraction, bits: int) -> tuple[float, float]:
-        """(bits that will be lost, steps that will be taken) up to ``time``, where ``bits`` are to be left."""
+        """Forecast of (bits lost, steps) up to ``time``, where ``bits`` bits are to be left."""
         direction = 1 if time > 0 else -1
         span = abs(time) * self.motion(direction).scaled.rate
         return self._forecast(direction, span, self.start.flat, bits)
 
     def _motion(self, direction: int, start: tuple[Fraction, ...]) -> ScaledMotion:
-        """That of ``start``: of y, or of y and ξ."""
+        """The motion of ``start``, y or (y, ξ), in scaled units."""
         key = (direction, len(start))
         if key not in self._motions:
             motion = ScaledMotion.of(self.system, self.parameters, start, direction > 0)
@@ -564,7 +563,7 @@ class Validated:
         raise self._refusal(time, 0)
 
     def _pilot(self, direction: int, start: tuple[Fraction, ...], bits: int) -> Pilot:
-        """In as many bits as short motions take, where they are not many."""
+        """The pilot, in the bits of short motions where these are few."""
         motion = self._motion(direction, start)
         precision, in_words = motion.precision(bits + _PILOT_ROOM, inf)
         if not in_words or precision > _MOST_PILOT_BITS:
@@ -579,7 +578,7 @@ class Validated:
     def _forecast(
         self, direction: int, span: Fraction, start: tuple[Fraction, ...], bits: int, most: float | None = None
     ) -> tuple[float, float]:
-        """(bits that will be lost, steps that will be taken) up to ``span``, where ``bits`` are to be left."""
+        """Forecast of (bits lost, steps) up to ``span``, where ``bits`` bits are to be left."""
         pilot = self._pilot(direction, start, bits)
         if most is None:
             a_step = seconds_a_step(pilot.run.precision, pilot.run.certified is not None)
@@ -590,14 +589,14 @@ class Validated:
     def _cost(
         self, time: Fraction, bits: int, start: tuple[Fraction, ...], loss: float = 0.0, most: float | None = None
     ) -> float:
-        """loss: bits that are lost at least."""
+        """Seconds of the model, as :meth:`cost`; loss: bits that are lost at least."""
         direction = 1 if time > 0 else -1
         motion = self._motion(direction, start)
         forecast, steps = self._forecast(direction, abs(time) * motion.scaled.rate, start, bits, most)
         return motion.seconds_for(bits, max(loss, forecast), steps)
 
     def _reachable(self, time: Fraction, bits: int, loss: float, start: tuple[Fraction, ...]) -> int:
-        """Fewer bits than ``bits``, within the effort."""
+        """A number of bits below ``bits`` within the effort."""
         reachable = bits * 15 // 16
         while reachable > 0 and self._cost(time, reachable, start, loss) > self.effort:
             reachable = reachable * 15 // 16
@@ -643,8 +642,8 @@ def _rounded_up(value: Fraction) -> tuple[float, int]:
 
 @whole_evaluation
 def _evaluated(taken: Step, tau: Fraction, radii: Matrix, bits: int, sizes: tuple[Fraction, ...]) -> list[arb]:
-    """The state at ``tau`` in the units given."""
-    # numpy would let other threads in amid the balls: the radii are there already
+    """The state at ``tau`` in the units of the problem."""
+    # numpy could switch threads between balls: the radii are computed before
     with working_precision(bits):
         values = taken.around(tau, radii)
         return [value * ball(size) for value, size in zip(values, sizes, strict=True)]

@@ -53,10 +53,10 @@ from heavytop.multiword.fixed_point.certified_series import CertifiedSeries, Wor
 from heavytop.multiword.integers.integer_series import QuadraticComponent, QuadraticField, coefficients
 from heavytop.multiword.problem import variation as variation_of
 
-# A vector field of degree two, taken apart into exact numbers.
+# The exact coefficients of a vector field of degree two.
 #
-# Both systems have fields f(y) = Q(y, y) + L y without a constant part.  The coefficients are not written down a second
-# time: they are read off the field itself by evaluating it at the basis vectors and their pairwise sums.
+# All systems have fields f(y) = Q(y, y) + L y without a constant part.  The coefficients are computed from the field,
+# by evaluating it at the basis vectors and their pairwise sums.
 
 
 Matrix = NDArray[np.float64]
@@ -90,7 +90,7 @@ class Quadratic:
 
 
 def quadratic(field: Field, dimension: int) -> Quadratic:
-    """``field`` taken apart; it must be of degree two without a constant part."""
+    """The coefficients of ``field``, which must be of degree two without a constant part."""
     unit = [tuple(mpq(int(i == j)) for i in range(dimension)) for j in range(dimension)]
     plus = [field(e) for e in unit]
     minus = [field(tuple(-x for x in e)) for e in unit]
@@ -143,7 +143,7 @@ def _rounded(value: Fraction) -> float:
         return inf if value > 0 else -inf
 
 
-# The Taylor polynomial of a step: whole coefficients, with what its proof needs to know of them.
+# The Taylor polynomial of a step: integer coefficients, with the quantities that its proof needs.
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class Whole:
 
     @property
     def thrifty(self) -> tuple[float, float]:
-        """2.1 to 3.8 bits a power of τ, about e^-2: N² multiplications of a step 1/h."""
+        """Orders per bit between which a unit of time costs least: 2.1 to 3.8 bits a power of τ, about e^-2."""
         return 0.27, 0.45
 
     @property
@@ -254,7 +254,7 @@ class Errors:
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """The motion at ``time``: centre in ulps plus the set of errors; ``halvings``: the next step is 2^-halvings."""
+    """The motion at ``time``: centre in ulps plus the set of errors.  halvings: the next step is 2^-halvings."""
 
     time: Fraction
     centre: Sequence[int]
@@ -333,8 +333,8 @@ class Step:
     def end(self, transfer: tuple[Matrix, Matrix, float] | None = None, dropped: int = 0) -> Node:
         """The node at τ = 1: Σ b_n, and the set of errors in a new frame, that of :meth:`transfer`.
 
-        dropped: how many bits fewer than this step the node has.  The sum is then rounded to nearest, by at most half
-        of its ulp in each component, and the set is wider by as much; with 0 the sum is exact.
+        dropped: the bits that the node has fewer than this step.  The sum is then rounded to nearest, by at most half
+        of its ulp in each component, and the set is widened by as much; with 0 the sum is exact.
         """
         errors = self.node.errors
         frame, transformed, slack = transfer or self.transfer()
@@ -349,7 +349,7 @@ class Step:
         return Node(self.node.time + self.length, centre, Errors(frame, radii, exponent - dropped), self._halvings())
 
     def _halvings(self) -> int:
-        """The next step: where the orders a bit are few it is doubled, where they are many it is halved."""
+        """The next step: doubled where the orders per bit are few, halved where they are many."""
         (few, many), orders_per_bit = self.series.thrifty, self.order / (self.precision + 16)
         if orders_per_bit > many:
             return self.node.halvings + 1
@@ -486,9 +486,9 @@ def _tail(field: Quadratic, node: Node, series: StepSeries, precision: int) -> _
 
 
 def in_other_bits(field: Quadratic, taken: Step, precision: int, certified: CertifiedSeries | None) -> Step | None:
-    """``taken`` with a polynomial in ``precision`` bits, from its centre rounded to them; None where that has no proof.
+    """``taken`` with a polynomial in ``precision`` bits, from its rounded centre; None where that is not proven.
 
-    The set of errors is a box around that of ``taken``, wider by what was rounded.  V̂ remains that along the polynomial
+    The set of errors is a box around that of ``taken``, widened by the rounding.  V̂ remains that along the polynomial
     of ``taken``: W is the larger of both, so that the motion is within it of either.
     """
     node, shift = taken.node, precision - taken.precision

@@ -1,7 +1,7 @@
-"""Balls (python-flint's arb): exact numbers in, enclosures out.
+"""Balls (python-flint's arb): enclosures of functions of exact numbers.
 
-The working precision of FLINT is one for the whole process, so every evaluation stands inside
-:class:`heavytop.exact.flint.balls.working_precision`, which is to be had from here too.
+FLINT has one working precision for the whole process, so every evaluation is inside
+:class:`heavytop.exact.flint.balls.working_precision`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from heavytop.precision import quotient_text, ratio_text
 from heavytop.top.equations import Parameters
 from heavytop.top.heavy_top import HeavyTop, State
 
-# Numbers of any size: how long exact data may be, and the unit of time in which a motion is of ordinary size.
+# The largest length of exact data, and the unit of time in which a motion changes at a rate near 1.
 #
 # With Ω = s ω, τ = s t and P r = s² n the equations of ω, γ and n in τ are those of Ω, γ and P r in t.
 
@@ -35,7 +35,7 @@ _ORDINARY = 16
 
 
 def require_handy(top: HeavyTop, start: State, times: Iterable[Fraction] = ()) -> None:
-    """Raises OutOfReach for numbers whose exact arithmetic would take longer than anyone waits."""
+    """Raise OutOfReach for numbers whose exact arithmetic would take too long."""
     for value in (*top.inertia, *top.moment, *(top.rotor or ()), *start.flat, *times):
         length = max(value.numerator.bit_length(), value.denominator.bit_length())
         if length > _LONGEST:
@@ -46,7 +46,7 @@ def require_handy(top: HeavyTop, start: State, times: Iterable[Fraction] = ()) -
 
 
 def unit_of_time(parameters: Parameters, start: tuple[Fraction, ...]) -> int:
-    """k such that the motion changes at about the rate 2^k; 0 for ordinary rates, from 2^-16 to 2^16.
+    """k such that the motion changes at about the rate 2^k; 0 for rates from 2^-16 to 2^16.
 
     The rates are |Ω|, |λ| or |k|/I, and the root of |P r||γ|/I, whichever is largest.
     """
@@ -62,37 +62,36 @@ def exponent(value: Fraction) -> int:
     return value.numerator.bit_length() - value.denominator.bit_length()
 
 
-# FLINT's context, its working precision and length of power series, one evaluation at a time.
+# FLINT's context, its working precision and length of power series, for one evaluation at a time.
 #
-# ``flint.ctx`` is one for the whole process.  So every evaluation of this program stands inside a block that sets it,
-# :class:`working_precision` or :class:`series_length`, and one re-entrant lock admits one thread at a time to them.
+# ``flint.ctx`` is shared by the whole process.  So every evaluation of this program is inside a block that sets it,
+# :class:`working_precision` or :class:`series_length`, and one re-entrant lock admits one thread at a time.
 #
-# That keeps the threads of this program apart.  A thread of the user may still set ``flint.ctx`` meanwhile.  So each
-# block looks on its way in and out whether the context is the one that it set; if not, :class:`ContextChanged` is
-# raised, and :func:`whole_evaluation`, the decorator of what evaluates from beginning to end, evaluates again.  From
-# the first such change on, other threads are let in less often during an evaluation, so that it comes through.  At the
-# end the context is what the user made it.
+# A thread of the user may still set ``flint.ctx`` meanwhile.  So each block compares the context with the one that it
+# set, at its entry and at its exit; if they differ, it raises :class:`ContextChanged`, and :func:`whole_evaluation`,
+# the decorator of complete evaluations, evaluates again.  After the first such change threads are switched less often
+# during an evaluation, so that it succeeds.  At the end the context is the user's again.
 #
-# Nothing of the user's (an observer, another package's integrator) may be called inside a block: it might wait for a
+# No code of the user (an observer, another package's integrator) may be called inside a block: it might wait for a
 # thread that waits for the lock.
 #
 # Ctrl-C comes after a call at the earliest.  From Python 3.14 on ``with _lock`` calls, and Ctrl-C between the lock and
-# its block would leave it held.  So the lock is taken within a ``try``, and released by the first call of its
-# ``finally``; where Ctrl-C came before it was taken, that raises RuntimeError.
+# its block would leave it held.  So the lock is acquired within a ``try``, and released by the first call of its
+# ``finally``; where Ctrl-C came before the lock was acquired, that raises RuntimeError.
 
 
 P = ParamSpec("P")
 Result = TypeVar("Result")
 
 _DEFAULTS = 53, 10
-"""FLINT's own precision and length: what an outermost block that does not set both finds, whatever the user's are."""
+"""FLINT's default precision and length, from which an outermost block starts, whatever the user's are."""
 _ATTEMPTS = 7
 _UNHURRIED = 0.05
-"""Seconds between two switches of threads in an evaluation that was disturbed before; four times as long each time."""
+"""Seconds between two switches of threads in an evaluation that was disturbed before; times four at each attempt."""
 
 
 class ContextChanged(HeavyTopError):
-    """Another thread set ``flint.ctx`` during an evaluation, each time that it was tried."""
+    """Another thread set ``flint.ctx`` during every attempt of an evaluation."""
 
     exit_code = ExitCode.INCOMPLETE
 
@@ -104,10 +103,10 @@ class ContextChanged(HeavyTopError):
 
 
 class _Held:
-    """Who evaluates now, and what the context is meant to be; changed by the thread that owns the lock alone.
+    """The evaluating thread and the intended context; changed only by the thread that owns the lock.
 
-    thread: 0 for none.  context: the precision and length set by this program.  own: the user's, to be put back.
-    disturbed: whether the context was found changed since the outermost block began; ever: in this process.
+    thread: 0 for none.  context: the precision and length set by this program.  own: the user's, to be restored.
+    disturbed: whether the context was changed since the outermost block began; ever: in this process.
     """
 
     __slots__ = ("context", "disturbed", "ever", "own", "thread")
@@ -123,7 +122,7 @@ _held = _Held()
 
 
 def _note() -> None:
-    """The context is not what it was set to: remember what the user wants from now on, and set it again."""
+    """Record the context that the user has set meanwhile, and restore the intended one."""
     precision, context, users = (ctx.prec, ctx.cap), _held.context, _held.own
     _held.disturbed = _held.ever = True
     _held.own = (
@@ -134,7 +133,7 @@ def _note() -> None:
 
 
 def _set(context: tuple[int, int]) -> None:
-    """Set what is not set already: FLINT's setter works out decimal digits each time."""
+    """Set the context where it differs: FLINT's setter also computes decimal digits."""
     precision, length = context
     if ctx.prec != precision:
         ctx.prec = precision
@@ -143,17 +142,17 @@ def _set(context: tuple[int, int]) -> None:
 
 
 def current_precision() -> int:
-    """The precision of the block that this stands in, whatever another thread has made of ``flint.ctx`` meanwhile."""
+    """The precision of the enclosing block, whatever another thread has set meanwhile."""
     return _held.context[0]
 
 
 def current_length() -> int:
-    """The length of power series of the block that this stands in, as :func:`current_precision`."""
+    """The length of power series of the enclosing block, whatever another thread has set meanwhile."""
     return _held.context[1]
 
 
 def require_undisturbed() -> None:
-    """Raise ContextChanged if the context was changed since the evaluation began: before something is kept."""
+    """Raise ContextChanged if the context was changed since the evaluation began; called before a result is cached."""
     if (ctx.prec, ctx.cap) != _held.context:
         _note()
     if _held.disturbed:
@@ -161,7 +160,7 @@ def require_undisturbed() -> None:
 
 
 def _alone(thread: int) -> Generator[None, None, None]:
-    """Holds the lock from the first ``next`` until it is closed or forgotten, wherever Ctrl-C comes meanwhile."""
+    """Hold the lock from the first ``next`` until it is closed or deleted, whenever Ctrl-C comes."""
     try:
         _lock.acquire()
         _held.own = ctx.prec, ctx.cap
@@ -180,7 +179,7 @@ def _alone(thread: int) -> Generator[None, None, None]:
 
 
 class _Block:
-    """The base of both blocks.  precision, length: None for the one that stays."""
+    """The base of both blocks.  precision, length: None for unchanged."""
 
     __slots__ = ("before", "holding", "length", "precision")
     precision: int | None
@@ -201,7 +200,7 @@ class _Block:
                 length if self.length is None else self.length,
             )
             _set(_held.context)
-        except BaseException:  # Ctrl-C, or no precision: FLINT says what is wrong with it
+        except BaseException:  # Ctrl-C, or a precision that FLINT refuses
             if self.holding:
                 self.holding.close()
             else:
@@ -214,7 +213,7 @@ class _Block:
         disturbed, outermost = _held.disturbed, self.holding is not None
         if self.holding:
             self.holding.close()
-        else:  # no call, after which Ctrl-C might come, between the context and what it is meant to be
+        else:  # no call, after which Ctrl-C might come, between both contexts
             precision, length = self.before
             if ctx.prec != precision:
                 ctx.prec = precision
@@ -228,7 +227,7 @@ class _Block:
 class working_precision(_Block):  # noqa: N801 - reads as a verb
     """FLINT's working precision set to ``bits`` ≥ 2 within the block, for this thread alone.
 
-    length: of power series, as :class:`series_length` sets it; None for the one around the block.
+    length: of power series, as in :class:`series_length`; None for that of the enclosing block.
     Raises ContextChanged at the end where another thread changed the context meanwhile.
     """
 
@@ -251,9 +250,9 @@ class series_length(_Block):  # noqa: N801 - reads as a verb
 
 
 def whole_evaluation(function: Callable[P, Result]) -> Callable[P, Result]:
-    """``function`` with the context for itself from beginning to end, and again where another thread changed it.
+    """``function`` with an undisturbed context; it is called again where another thread changed the context.
 
-    function: evaluates balls; gives the same when it is called again, and calls nothing of the user's.
+    function: evaluates balls, can be repeated, and calls no code of the user.
     The result raises ContextChanged after seven disturbed evaluations.
     """
 
@@ -313,7 +312,7 @@ def coefficient(series: Any, order: int) -> Any:
 
 
 def _after_fork() -> None:
-    """A forked child has no other thread: none that could release the lock."""
+    """Replace a lock that another thread held at the fork: the child has no thread that could release it."""
     global _lock
     if _held.thread not in (0, get_ident()):
         _lock = RLock()
@@ -326,7 +325,7 @@ if hasattr(os, "register_at_fork"):
 
 
 class BallLike(Protocol):
-    """A ball, a complex ball or a power series of either, as far as one formula for all of them goes."""
+    """The arithmetic that balls, complex balls and power series of either have in common."""
 
     def __neg__(self) -> Self: ...
     def __add__(self, other: Any, /) -> Self: ...
@@ -347,7 +346,7 @@ class BallLike(Protocol):
 
 
 Balls = TypeVar("Balls", bound=BallLike)
-"""Balls, complex balls or power series: those of the arguments and of what is returned."""
+"""Balls, complex balls or power series: the type of the arguments and of the result."""
 
 
 FUNCTIONS = SimpleNamespace(
@@ -369,7 +368,7 @@ _GUARD, _STEP = 16, 64
 _RADIUS_BITS = 30
 _RADIUS_DIGITS = 3
 _ENOUGH = 1 << 15
-"""Working bits that are always tried: tops whose moments, weight and spin differ by a thousand decades need them."""
+"""Working bits that are always tried, for tops whose moments, weight and spin differ by a thousand decades."""
 _SERIES_DIVISION = ("leading term in denominator is not nonzero", "quotient would not be a power series")
 """Message of python-flint on a division by a power series whose first coefficient may be 0, instead of nan."""
 
@@ -412,12 +411,12 @@ def _fraction(mantissa: SupportsInt, exponent: SupportsInt) -> Fraction:
 
 
 def radius_text(value: Fraction) -> str:
-    """A radius as decimal text of three digits, rounded up: it stays an upper bound."""
+    """A radius as decimal text of three digits, rounded up."""
     return quotient_text(value, _RADIUS_DIGITS, ROUND_CEILING)
 
 
 def ball_text(value: arb) -> str:
-    """A ball as text that :func:`ball_from` makes the very same ball of: ``m e r s`` for m 2^e ± r 2^s, or ``nan``."""
+    """A ball as text, ``m e r s`` for m 2^e ± r 2^s, or ``nan``; :func:`ball_from` restores the same ball."""
     if not value.is_finite():
         return "nan"
     # Decimal, as Python refuses to write or read an int of more than 4300 digits, or of what the process set
@@ -435,7 +434,7 @@ def ball_from(text: str) -> arb:
     with working_precision(m.bit_length() + 64):
         value = arb((m, e), (r, s))
         if r.bit_length() == _RADIUS_BITS:
-            # FLINT rounds such a radius up on its way in, and takes an addition of next to nothing for one unit
+            # FLINT rounds such a radius up at input, and adds one unit for a tiny addition
             value = arb((m, e), (r - 1, s)) + arb(0, (1, s - 100))
     if ball_text(value) != text:
         raise ValueError(f"no ball is {text[:60]!r}")
@@ -449,12 +448,12 @@ def _integer(text: str) -> int:
 
 
 def value_text(value: arb, digits: int) -> tuple[str, str]:
-    """(value, radius) as decimal text: the radius encloses the ball and the rounding of the printed value.
+    """(value, radius) as decimal text: the radius includes the rounding of the printed value.
 
-    A ball that holds 0 is printed as 0, with what it reaches to as its radius: no digit of its middle is known.
+    A ball that contains 0 is printed as 0 with its largest absolute value as the radius.
     """
     (m, e), (r, s) = ((int(part[0]), int(part[1])) for part in (value.mid().man_exp(), value.rad().man_exp()))
-    # over one denominator that need not be the least
+    # over one denominator, not reduced
     unit = min(e, s, 0)
     middle, wide = m << (e - unit), r << (s - unit)
     text = "0" if abs(middle) <= wide else ratio_text(middle, 1 << -unit, digits, ROUND_HALF_EVEN)
@@ -465,13 +464,13 @@ def value_text(value: arb, digits: int) -> tuple[str, str]:
 
 @whole_evaluation
 def nearest_integer(value: arb) -> int:
-    """The integer nearest to the middle of a ball; 0 if it is not finite."""
+    """The integer nearest to the midpoint of a ball; 0 if it is not finite."""
     nearest = (value + _HALF).mid().floor().unique_fmpz()
     return 0 if nearest is None else int(nearest)
 
 
 def relative_bits(value: arb) -> int:
-    """Bits that a ball of size about 1 or larger has right; absolute below 1; -1 if it is not finite."""
+    """Correct bits of a ball, relative above 1 and absolute below 1; -1 if it is not finite."""
     return max(0, min(_MAX_BITS, value.rel_one_accuracy_bits())) if value.is_finite() else -1
 
 
@@ -482,7 +481,7 @@ def _size(value: arb) -> int:
 
 
 def _graspable(value: arb, smallest: int) -> arb:
-    """``value``, or a ball around 0 with it inside where it is smaller than 2^smallest.
+    """``value``, or a ball around 0 that contains it where it is smaller than 2^smallest.
 
     Near a saddle components fall like e^(−t): at t = 10^6 their exact midpoints have a million bits.
     """
@@ -497,9 +496,10 @@ def to_bits(
 ) -> list[arb]:
     """``evaluate(working bits)`` repeated at growing working precision until every ball has ``bits`` bits.
 
-    Bits count relative to a value above 1 and absolutely below it; none are right where it raises Undecided.
-    time: what it is evaluated at; it costs its own bits, and the precision then comes in steps, so that lattices are
-    made once.  length: of power series meanwhile.
+    Bits count relative to a value above 1 and absolutely below it; Undecided counts as no correct bit.
+    time: of the evaluation; its size costs bits, and the precision is then a multiple of 64, so that lattices are
+    cached.
+    length: of power series.
     Raises OutOfReach where even a precision of 16 times the asked bits plus 4096, or of 32768, does not give them.
     """
     extra = -1 if time is None else _GUARD + (abs(time.numerator) // time.denominator).bit_length()
@@ -540,9 +540,9 @@ def largest_singular_value(matrix: list[list[arb]], bits: int) -> arb:
     """σ ≥ 0 with σ² the largest eigenvalue of S = JᵀJ: a ball, as narrow as ``matrix`` allows to ``bits`` bits.
 
     From below Rayleigh's quotient of any vector, here an approximate eigenvector, at most σ².  From above any μ such
-    that μ − S is positive definite, which Cholesky's factorisation in balls proves: μ is the quotient and a margin,
-    sixteen times as large as long as the factorisation does not exist.  So several equal singular values do no harm.
-    An infinite ball where neither comes to an end.
+    that μ − S is positive definite, which Cholesky's factorisation in balls proves: μ is the quotient plus a margin,
+    which grows sixteenfold until the factorisation exists.  Several equal singular values need no special case.
+    An infinite ball where no such μ is found.
     """
     with working_precision(2 * bits + 64):
         entries = arb_mat(matrix)
@@ -569,7 +569,7 @@ def _quotient(square: arb_mat) -> arb:
 
 
 def _positive_definite(shift: arb, square: arb_mat) -> bool:
-    """Whether shift − S is: every pivot of its L D Lᵀ factorisation is proven to be positive."""
+    """Whether shift − S is positive definite: every pivot of its L D Lᵀ factorisation is proven to be positive."""
     size = square.nrows()
     remaining = [[(shift if i == j else arb(0)) - square[i, j] for j in range(size)] for i in range(size)]
     for k in range(size):

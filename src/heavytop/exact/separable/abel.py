@@ -6,8 +6,8 @@ Variables v_k that swing in gaps (:mod:`heavytop.exact.separable.oscillation`), 
     G_j(θ) = Σ_k ε_k F_kj(θ_k),   ε_k = ±1.
 
 G is one-to-one from R^n onto R^n: its Jacobian is ε1 ε2 (v2 − v1)/√(g1 g2) ≠ 0 for disjoint gaps, and it differs from
-a linear map by periodic functions (Hadamard's theorem).  :meth:`Inversion.phases` takes whole turns off, and proves
-what Newton's iteration found by Krawczyk's operator (Neumaier, Interval Methods for Systems of Equations, 5.1).
+a linear map by periodic functions (Hadamard's theorem).  :meth:`Inversion.phases` subtracts whole turns, and proves
+the result of Newton's iteration by Krawczyk's operator (Neumaier, Interval Methods for Systems of Equations, 5.1).
 """
 
 from __future__ import annotations
@@ -64,16 +64,16 @@ class Inversion:
         return arb_mat(columns).transpose()
 
     def _periods(self) -> arb_mat:
-        """The growth of G with a turn of each phase (a unit, where it never returns), a column for each."""
+        """The growth of G per turn of each phase (per unit of a phase that is not periodic), a column for each."""
         columns = [[sign * c for c in v.column] for v, sign in zip(self.variables, self.signs, strict=True)]
         return arb_mat(columns).transpose()
 
     def mean_rates(self, slopes: Sequence[arb]) -> list[arb]:
-        """Turns of each phase a unit of time (units, where it never returns), where G grows by ``slopes``."""
+        """Turns (or units) of each phase per unit of time, where G grows by ``slopes``."""
         return self._periods().solve(arb_mat([[slope] for slope in slopes])).entries()
 
     def phases(self, target: Sequence[arb]) -> tuple[list[arb], list[int]]:
-        """(θ in the first turns, whole turns n) with G(θ + 2πn) = target: balls that hold the only solution.
+        """(θ in the first turns, whole turns n) with G(θ + 2πn) = target: balls that contain the unique solution.
 
         Not finite where the working precision does not prove it.
         """
@@ -98,7 +98,7 @@ class Inversion:
         return arb_mat([[value] for value in self.values(phases)]) - target
 
     def _estimated(self, phases: list[arb], target: arb_mat) -> list[arb]:
-        """Newton's iteration in few bits, every step as short as it must be to come nearer."""
+        """Newton's iteration in few bits, damped so that every step reduces the defect."""
         with working_precision(_FEW_BITS):
             now = [phase.mid() for phase in phases]
             defect = self._defect(now, target)
@@ -116,7 +116,7 @@ class Inversion:
         return now
 
     def _refined(self, near: list[arb], target: arb_mat) -> list[arb]:
-        """Newton's iteration in balls at growing precision, and the proof at the last."""
+        """Newton's iteration at growing precision, and the proof at the last one."""
         needed, precisions = current_precision() // 2 + 8, []
         while needed > _FEW_BITS:
             precisions.append(needed)
@@ -126,7 +126,7 @@ class Inversion:
                 for _ in range(_REPEATED):
                     step = (self._inverse(near) * self._defect(near, target)).entries()
                     near = [(x - s).mid() for x, s in zip(near, step, strict=True)]
-                    # the next one would be of the size of its square
+                    # the next step would have the size of its square
                     if all(abs(s) < arb(2) ** (8 - precision // 2) for s in step):
                         break
         return self._proven(near, target)
@@ -135,7 +135,7 @@ class Inversion:
         return self.slopes(phases).inv().mid()
 
     def _proven(self, near: list[arb], target: arb_mat) -> list[arb]:
-        """Krawczyk's image of a box around the phases, if it lies inside the box."""
+        """Krawczyk's image of a box around the phases, where it lies inside the box."""
         inverse = self._inverse(near)
         step = (inverse * self._defect(near, target)).entries()
         floor = arb(2) ** (-current_precision())
@@ -164,7 +164,7 @@ def phase_at(variable: Moving, moment: arb) -> tuple[arb, int]:
     return phase, turns
 
 
-# One of two variables rests at a double root of the polynomial: what is left of Abel's integrals for the other.
+# Abel's integrals where one of two variables rests at a double root of the polynomial.
 #
 # Where v_o rests at a double root e the integrand v^j/√g of the other has a pole at e, and with G_j = ε F_j + (...)
 # above only the combination without it moves,
@@ -175,7 +175,7 @@ def phase_at(variable: Moving, moment: arb) -> tuple[arb, int]:
 
 
 class Rest:
-    """The variable at rest at ``middle``; its phase stays 0."""
+    """A variable at rest at ``middle``; its phase is 0."""
 
     def __init__(self, middle: arb) -> None:
         self.middle = middle
@@ -184,11 +184,11 @@ class Rest:
         return phase * 0 + self.middle
 
     def density(self, v: Balls) -> Balls:
-        """1: no phase depends on it."""
+        """1, as no phase depends on it."""
         return v * 0 + 1
 
     def ends(self, phase: Balls) -> tuple[Balls, Balls]:
-        """√(v − e), at both ends, which are one."""
+        """√(v − e) at both ends, which coincide."""
         return phase * 0, phase * 0
 
     def bend(self, phase: Balls) -> Balls:
@@ -200,7 +200,7 @@ class Rest:
 
 
 class RestingVariable:
-    """``variable`` with the one integral H for a variable at rest at ``place``, outside its gap."""
+    """``variable`` with the integral H, beside a variable at rest at ``place``, outside its gap."""
 
     def __init__(self, variable: Gap | Approach, place: arb) -> None:
         self.variable, self.place = variable, place
@@ -225,8 +225,8 @@ class RestingVariable:
 Moving: TypeAlias = Gap | Approach | RestingVariable
 """A variable of an :class:`Inversion`.
 
-turn: its phase grows by this and its integrals by ``column`` with every turn; for a variable that never returns,
-what its integrals grow by with every unit of the phase, at last.  periodic: which of both.
+turn: its phase grows by this and its integrals by ``column`` with every turn; without a period, ``column`` is the
+asymptotic growth of its integrals per unit of the phase.  periodic: which of both.
 position: v at a phase.  density: dF_0 by dphase at v, > 0.  integrals: F_j at a phase.
 """
 Variable: TypeAlias = Gap | Approach | Rest
@@ -236,11 +236,10 @@ ends: √(v − lo) and √(hi − v), each with a sign that makes it analytic; 
 """
 
 
-# What Kovalevskaya's and Goryachev-Chaplygin's tops share: their tops, and two separated variables on a straight line.
+# Two separated variables on a straight line, for Kovalevskaya's and Goryachev and Chaplygin's tops.
 #
-# Both have I1 = I2, their centre of mass in that plane and two variables whose integrals G_0, G_1
-# above grow linearly with time.  One of the two may rest; then one integral of the other is left, and grows linearly
-# too.
+# Both have I1 = I2, the centre of mass in that plane and two variables whose integrals G_0, G_1 above grow linearly
+# with time.  One of the two may rest; then one integral of the other remains, and grows linearly too.
 
 
 REMEDY = "The validated enclosure holds for every motion."
@@ -251,7 +250,7 @@ _DECISIONS, _RIGHT = (64, 256, 1024, 4096), 10
 def decide(
     test: Callable[[], object], name: str = "The level is degenerate but for less than about 1e-300", least: int = 64
 ) -> None:
-    """``test`` at the first working precision that suffices for it, ``least`` bits or more.
+    """Run ``test`` at the first working precision that suffices for it, at least ``least`` bits.
 
     Raises LevelNotDone where none does, and where the test raises OutOfReach.
     """
@@ -270,14 +269,14 @@ def decide(
 
 
 def refuse(name: str, apart: arb, of: str) -> NoReturn:
-    """Raises LevelNotDone with the distance, Undecided where the working precision does not tell it."""
+    """Raise LevelNotDone with the distance, or Undecided where the working precision does not determine it."""
     if apart.rel_accuracy_bits() < _RIGHT:
         raise Undecided
     raise LevelNotDone(f"{name} but for {apart.str(2, radius=False)}, the distance of {of}.", REMEDY)
 
 
 def ordered(roots: Sequence[acb]) -> list[int]:
-    """The numbers of the real roots, rising; raises Undecided where two balls meet."""
+    """The indices of the real roots in ascending order; raises Undecided where two balls overlap."""
     real = sorted((i for i, root in enumerate(roots) if root.imag.is_zero()), key=lambda i: midpoint(roots[i].real))
     if any(roots[i].overlaps(roots[j]) for i, j in pairwise(real)):
         raise Undecided
@@ -287,7 +286,7 @@ def ordered(roots: Sequence[acb]) -> list[int]:
 def alternate(real: Sequence[int], multiplicities: Sequence[int], positive: bool) -> list[tuple[int, int]]:
     """Pairs of successive real roots between which a polynomial is positive.
 
-    real: their numbers, rising.  multiplicities: of all roots, by number.  positive: whether it is below the lowest.
+    real: their indices, ascending.  multiplicities: of all roots.  positive: whether it is below the lowest.
     """
     intervals = []
     for low, high in pairwise(real):
@@ -298,10 +297,10 @@ def alternate(real: Sequence[int], multiplicities: Sequence[int], positive: bool
 
 
 def variable_between(ends: tuple[int, int], roots: Sequence[tuple[acb, int]], lead: arb, most: int) -> Variable:
-    """The gap between two simple roots, or the way from a simple one to a double one and back; one at rest on a root.
+    """A variable between two simple roots, between a simple and a double one, or at rest on a root.
 
-    ends: the numbers of the lower and the upper root.  roots: with multiplicities.  Raises Undecided where the working
-    precision does not part the ends, OutOfReach for Fourier series of more than ``most`` terms.
+    ends: the indices of the lower and the upper root.  roots: with multiplicities.  Raises Undecided where the working
+    precision does not separate the ends, OutOfReach for Fourier series of more than ``most`` terms.
     """
     low, high = (roots[number][0].real for number in ends)
     if ends[0] == ends[1]:
@@ -316,9 +315,9 @@ def variable_between(ends: tuple[int, int], roots: Sequence[tuple[acb, int]], le
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """Two variables, and what of their integrals grows linearly: from ``origin`` at the rates ``slopes``.
+    """Two variables whose integrals grow linearly, from ``origin`` at the rates ``slopes``.
 
-    moving: the numbers of those that do not rest.
+    moving: the indices of the variables that do not rest.
     """
 
     variables: tuple[Variable, ...]
@@ -331,7 +330,7 @@ class Line:
     def of(
         cls, variables: tuple[Variable, ...], signs: tuple[int, int], slopes: tuple[int, int], phases: Sequence[arb]
     ) -> Line:
-        """From the phases at t = 0; signs: ε, slopes: of G_0 and G_1."""
+        """The line through the phases at t = 0; signs: ε, slopes: of G_0 and G_1."""
         moving = {k: variable for k, variable in enumerate(variables) if not isinstance(variable, Rest)}
         inversion, rates = Inversion(tuple(moving.values()), signs), tuple(map(arb, slopes))
         if len(moving) == 1:
@@ -382,7 +381,7 @@ class Line:
 #
 #     ∫_0^s cos(χ + xs') ds' = s cos(χ + xs/2) sin(xs/2)/(xs/2),   x = ω1ν1 ± ω2ν2,
 #
-# so that no divisor is small.  c comes from n1 × n2 values at φ = (i + ½) π/n.  Where |K| ≤ W on |Im φ_k| ≤ η_k, the
+# so that no divisor is small.  c follows from n1 × n2 values at φ = (i + ½) π/n.  Where |K| ≤ W on |Im φ_k| ≤ η_k, the
 # coefficients of e^(i(ν1φ1 + ν2φ2)) are at most W e^(−η1|ν1| − η2|ν2|); at these points every ν ≥ n takes the values of
 # one below, or vanishes, so that K is off by at most twice the sum of those left out,
 #
@@ -419,7 +418,7 @@ class Factor(NamedTuple):
     values: Sequence[arb]
 
     def transform(self) -> arb_mat:
-        """Takes the values of D at the points to the coefficients of the product."""
+        """The matrix from the values of D at the points to the coefficients of the product."""
         count = len(self.values)
         cosines = [arb.cos_pi_fmpq(fmpq(k, 4 * count)) for k in range(8 * count)]
         shift, rows = 2 * count if self.symmetry.odd else 0, []
@@ -438,7 +437,7 @@ def points(count: int) -> list[arb]:
 def counts(widths: Sequence[arb | None]) -> tuple[int, int]:
     """n1, n2 with an error of K below W times the working precision; widths: η, None for an angle at rest.
 
-    Raises OutOfReach where they are too many.
+    Raises OutOfReach where they are too large.
     """
     floats = [None if width is None else max(float(width), _NARROWEST) for width in widths]
     decay = (current_precision() + 6) * log(2) - sum(log(-expm1(-width)) for width in floats if width)
@@ -452,7 +451,7 @@ def counts(widths: Sequence[arb | None]) -> tuple[int, int]:
 
 
 def error_of(largest: arb, widths: Sequence[arb | None], terms: Sequence[int]) -> arb:
-    """The bound on what K is off by; largest: W."""
+    """The bound of the error of K; largest: W."""
     sums, tails = [], []
     for width, count in zip(widths, terms, strict=True):
         decay = arb(0) if width is None else (-width).exp()
@@ -462,7 +461,7 @@ def error_of(largest: arb, widths: Sequence[arb | None], terms: Sequence[int]) -
 
 
 class Resonance(NamedTuple):
-    """A term c f(φ1) g(φ2) that is integrated as it stands; twice: 2ν of both."""
+    """A term c f(φ1) g(φ2) that is integrated from the start of the line; twice: 2ν of both."""
 
     coefficient: arb
     twice: tuple[int, int]
@@ -481,7 +480,7 @@ class Product:
 
     @classmethod
     def of(cls, first: Factor, kernel: arb_mat, second: Factor, rates: Sequence[arb], largest: arb) -> tuple[Self, arb]:
-        """With a bound on the terms that are left out as too small; largest: W, rates: ω1, ω2."""
+        """The product, and a bound of the terms omitted as too small; largest: W, rates: ω1, ω2."""
         table = (first.transform() * kernel * second.transform().transpose()).tolist()
         smallest, dropped = largest * arb(2) ** (8 - current_precision()), arb(0)
         sizes = [[abs(c).upper() for c in row] for row in table]
@@ -518,7 +517,7 @@ class Product:
         return along[0, 1] - along[1, 0]
 
     def resonant(self, began: Sequence[arb], rates: Sequence[arb], length: arb) -> arb:
-        """The integral of the resonances over a line of that length that begins at the angles ``began``."""
+        """The integral of the resonances over a line of that length from the angles ``began``."""
         total = arb(0)
         for coefficient, twice in self.resonances:
             phases = [
@@ -535,7 +534,7 @@ class Product:
 class LineIntegral:
     """∫ K along φ_k = φ_k(0) + ω_k s.
 
-    error: a bound on what K is off by.
+    error: a bound of the error of K.
     """
 
     products: tuple[Product, ...]
@@ -553,13 +552,13 @@ class LineIntegral:
         largest: arb,
         error: arb,
     ) -> Self:
-        """From the pairs (a, b) and D at the points, W and the error of each pair."""
+        """The integral from the pairs (a, b) and D at the points, W and the error of each pair."""
         products = [Product.of(first, kernel, second, rates, largest) for first, second in pairs]
         dropped = sum((part for _, part in products), arb(0))
         return cls(tuple(product for product, _ in products), rates, began, dropped + len(products) * error)
 
     def at(self, angles: Sequence[arb], length: arb) -> arb:
-        """The integral to the angles, which the line reaches after ``length``, but for a constant."""
+        """The integral up to the angles at ``length``, up to a constant."""
         total = arb(0, (self.error * abs(length)).upper())
         for product in self.products:
             total += product.primitive(angles, self.rates) + product.resonant(self.began, self.rates, length)

@@ -1,4 +1,4 @@
-"""A variable that swings between two simple real roots of a polynomial, and its Abel integrals with a proven error.
+"""A variable that oscillates between two simple real roots of a polynomial, and its Abel integrals with error bounds.
 
     v = m + d cos θ,   m = (lo + hi)/2,   d = (hi − lo)/2,   f(v) = (v − lo)(hi − v) g(v),   g > 0 on [lo, hi]
 
@@ -6,7 +6,7 @@ The phase θ of a motion in the gap is monotone and regular, turning points incl
 
     F_j(θ) = ∫_0^θ v^j/√g dθ = c_0 θ + Σ (2c_n/n) sin nθ
 
-grow by a real period with every turn.  Their integrand h is even and 2π-periodic, and analytic on |Im θ| ≤ η as long as
+grow by a real period per turn.  Their integrand h is even and 2π-periodic, and analytic on |Im θ| ≤ η as long as
 v, which runs through ellipses there, leaves every other root b outside: η < β = |Im arccos z|, z = (b − m)/d, and
 
     |v − b| ≥ d (cosh β − cosh η),   cosh β = ½ (|z + 1| + |z − 1|),
@@ -93,7 +93,7 @@ class Roots:
 
 
 class SineSums:
-    """Σ_n a_n sin nθ, n ≥ 1, for several rows of coefficients at once, of which each precision takes those it sees."""
+    """Σ_n a_n sin nθ, n ≥ 1, for several rows of coefficients at once, cut where the working precision allows."""
 
     def __init__(self, rows: Sequence[Sequence[arb]]) -> None:
         self.rows = rows
@@ -112,7 +112,7 @@ class SineSums:
 
 
 class _SeenSums:
-    """Sums of the terms that one precision sees, few of them as polynomials in e^iθ; tails: balls with the others."""
+    """The leading terms of the sums, short sums as polynomials in e^iθ; tails: balls that contain the others."""
 
     def __init__(self, rows: Sequence[Sequence[arb]], tails: Sequence[arb]) -> None:
         length, self.tails = len(rows[0]) + 1, tails
@@ -143,8 +143,8 @@ class _SeenSums:
 class Gap:
     """A variable between two simple real roots ``lo`` < ``hi``.
 
-    rest: g.  count: how many integrals, j = 0 .. count − 1.  most: OutOfReach is raised where the Fourier series needs
-    more terms than this at the working precision.
+    rest: g.  count: the number of integrals, j = 0 .. count − 1.  most: the largest number of Fourier terms at the
+    working precision, beyond which OutOfReach is raised.
     """
 
     turn = 2 * pi
@@ -170,7 +170,7 @@ class Gap:
         return self.middle + self.reach * phase.cos()
 
     def ends(self, phase: Balls) -> tuple[Balls, Balls]:
-        """√(v − lo) and √(hi − v), each with a sign that makes it analytic: √(2d) cos(θ/2), √(2d) sin(θ/2)."""
+        """√(v − lo) and √(hi − v) with signs that make them analytic: √(2d) cos(θ/2), √(2d) sin(θ/2)."""
         sine, cosine = (phase / 2).sin_cos()
         root = (2 * self.reach).sqrt()
         return root * cosine, root * sine
@@ -192,7 +192,7 @@ class Gap:
 
 
 class FourierBound:
-    """The error of the Fourier series of v^j/√g; see the head of this file.
+    """Error bounds of the Fourier series of v^j/√g, as in the head of this file.
 
     divided: of (v^j/√g − its value at an end)/(1 − y²).
     """
@@ -227,11 +227,11 @@ class FourierBound:
         return power // 4 * 3 if power // 4 * 3 >= self.wanted else power
 
     def mean_error(self, terms: int, order: int) -> arb:
-        """The ball around 0 with the error of c_0."""
+        """A ball around 0 that contains the error of c_0."""
         return self._ball(2 * (-self.width * terms).exp() / (1 - (-self.width * terms).exp()), order)
 
     def sum_error(self, terms: int, order: int) -> arb:
-        """The ball around 0 with the error of F, c_0 apart."""
+        """A ball around 0 that contains the error of F, without that of c_0."""
         tail = (-self.width * terms / 2).exp() / (1 - (-self.width).exp())
         return self._ball((4 / (1 - (-self.width * terms).exp()) + 2) * tail, order)
 
@@ -254,7 +254,7 @@ def _cosh(z: acb) -> arb:
 
 
 def fourier_rows(middle: arb, reach: arb, rest: Roots, terms: int, count: int) -> list[list[arb]]:
-    """c_n, n < N/2, of v^j/√g, j < count, from ``terms`` = N values: without the error of aliasing."""
+    """c_n, n < N/2, of v^j/√g, j < count, from ``terms`` = N values; the error of aliasing is not included."""
 
     def values(cosine: arb) -> list[arb]:
         v = middle + reach * cosine
@@ -267,7 +267,7 @@ def fourier_rows(middle: arb, reach: arb, rest: Roots, terms: int, count: int) -
 
 
 def even_rows(values: Callable[[arb], list[arb]], terms: int) -> list[list[arb]]:
-    """c_n, n < N/2, of several functions of cos θ, from ``terms`` = N values, 4 | N: without the error of aliasing."""
+    """c_n, n < N/2, of several functions of cos θ from ``terms`` = N values, 4 | N, without the error of aliasing."""
     half = terms // 2
     cosines = [arb.cos_pi_fmpq(fmpq(i, half)) for i in range(half + 1)]
     samples = list(zip(*map(values, cosines), strict=True))
@@ -296,7 +296,7 @@ def _cosine_sums(values: list[acb], cosines: list[arb]) -> list[acb]:
     return sums[:half]
 
 
-# A variable that leaves and approaches a double root of a polynomial, and its Abel integrals with a proven error.
+# A variable asymptotic to a double root of a polynomial, and its Abel integrals with error bounds.
 #
 # Between a simple root o and a double root e of f = |v − o| (v − e)² g, L = e − o,
 #
@@ -319,7 +319,7 @@ def _cosine_sums(values: list[acb], cosines: list[arb]) -> list[acb]:
 class Approach:
     """A variable between a simple root ``turning`` and a double root ``limit``.
 
-    rest: g.  count: how many integrals.  most: as in :class:`heavytop.exact.separable.oscillation.Gap`.
+    rest: g.  count: the number of integrals.  most: as in :class:`heavytop.exact.separable.oscillation.Gap`.
     """
 
     turn = 1.0
@@ -401,13 +401,12 @@ def _divided(polynomial: arb_poly, point: arb) -> arb_poly:
     return arb_poly(quotients[::-1])
 
 
-# Attitude beside a variable that swings in one gap: the azimuth of a vector about the vertical is one more integral.
+# Attitude of a motion with a variable in one gap: the azimuth of a vector about the vertical is one more integral.
 #
-# Let h be the level part of a vector that the motion knows, and Λ its azimuth in space about γ.  Where Λ' = f(v) with a
-# rational f of the variable v, Λ is an Abel integral over its phase: a polynomial over √g times the denominator of f,
-# which counts as roots of multiplicity two.  It grows by a fixed angle
-# with every turn. The vector that is along h at t = 0 and fixed in space then stands at the angle Λ(0) − Λ from h
-# (:class:`WithBearing`).
+# Let h be the level part of a vector with known body components, and Λ its azimuth in space about γ.  Where Λ' = f(v)
+# with a rational f of the variable v, Λ is an Abel integral over its phase: a polynomial over √g times the denominator
+# of f, which counts as roots of multiplicity two.  It grows by a fixed angle per turn.  The vector fixed in space that
+# is along h at t = 0 then makes the angle Λ(0) − Λ with h (:class:`WithBearing`).
 
 
 @dataclass(frozen=True, slots=True)
@@ -418,7 +417,7 @@ class Azimuth:
     weights: tuple[arb, ...]
 
     def at(self, phase: arb, turns: int) -> arb:
-        """Λ at the phase, after so many whole turns."""
+        """Λ at the phase after whole turns."""
         parts = zip(self.weights, self.gap.integrals(phase), self.gap.column, strict=True)
         return sum((weight * (value + turns * period) for weight, value, period in parts), arb(0))
 
@@ -433,7 +432,7 @@ class Bearing:
 
     @classmethod
     def of(cls, gamma: Sequence[arb], vector: Sequence[arb], azimuth: arb) -> Bearing:
-        """From γ of any length and a vector whose level part is not 0."""
+        """The bearing of a vector whose level part is not 0; γ has any length."""
         square = dot(gamma, gamma)
         share = dot(vector, gamma) / square
         level = [v - share * g for v, g in zip(vector, gamma, strict=True)]
@@ -442,28 +441,28 @@ class Bearing:
         return cls(tuple(along), cross([g / square.sqrt() for g in gamma], along), azimuth)
 
     def carried(self, azimuth: arb) -> list[arb]:
-        """The body components here of the unit vector fixed in space that h had when Λ was ``azimuth``."""
+        """Body components of the unit vector fixed in space that was along h when Λ was ``azimuth``."""
         sine, cosine = (self.azimuth - azimuth).sin_cos()
         return [cosine * a - sine * b for a, b in zip(self.along, self.across, strict=True)]
 
 
 class WithBearing(WithXi):
-    """A motion that knows the bearing of one vector, and so the attitude.
+    """A motion with an attitude from the bearing of one vector.
 
-    Mixed into the dataclass of each case, which brings ``made``.
+    A mixin of dataclasses that have ``made``.
     """
 
     __slots__ = ()
 
     @abstractmethod
     def bearing(self, time: Fraction) -> Bearing:
-        """At FLINT's working precision.
+        """The bearing at FLINT's working precision.
 
-        Raises Undecided where that does not suffice, OutOfReach where the azimuth is not known.
+        Raises Undecided where that does not suffice, OutOfReach where there is no formula of the azimuth.
         """
 
     def xi_at(self, time: Fraction) -> list[arb]:
-        """At t = 0 along the level part of that vector."""
+        """ξ, along the level part of that vector at t = 0."""
         return self.bearing(time).carried(_began(self))
 
 
