@@ -1,12 +1,11 @@
-"""Motions whose tops or starts are algebraic numbers: known as balls to any precision, and rational data near them.
+"""Motions whose tops or starts are algebraic numbers: as balls to any precision, with rational data near them.
 
-Of Goryachev's, N. Kowalewski's and Chaplygin's motions no start with rational data is known, but for the moments of
-inertia.  So such a motion is a curve with rational coefficients (:mod:`heavytop.exact.cases.one_interval`) and a
+No start of Goryachev's, N. Kowalewski's and Chaplygin's motions is known whose data beside the moments of inertia are
+rational.  So such a motion is a curve with rational coefficients (:mod:`heavytop.exact.cases.one_interval`) and a
 rational place on it; N, Ω and γ follow as square roots of rational numbers, |γ| = 1.
 
-What a program integrates are rational data near them, :meth:`AlgebraicMotion.rounded`.  These are outside the class:
-their own truth is the validated enclosure (:mod:`heavytop.exact.enclosure.run`), as for any top, up to its reach and no
-farther.
+A program integrates rational data near them, :meth:`AlgebraicMotion.rounded`.  These are outside the class: their
+reference is the validated enclosure (:mod:`heavytop.exact.enclosure.run`), as of any top.
 """
 
 from __future__ import annotations
@@ -32,14 +31,14 @@ _ROUNDED_BITS = 256
 
 
 class Algebraic(ABC):
-    """A motion whose top or start is known by balls alone."""
+    """A motion whose top or start consists of balls."""
 
     __slots__ = ()
     inertia: Vector
 
     @abstractmethod
     def moment(self, bits: int) -> list[arb]:
-        """P r with at least so many bits."""
+        """P r to at least ``bits`` bits."""
 
     @abstractmethod
     def start(self, bits: int) -> list[arb]:
@@ -48,7 +47,7 @@ class Algebraic(ABC):
     def rounded(self, bits: int = _ROUNDED_BITS) -> tuple[HeavyTop, State]:
         """A top of weight 1 and a start, exact, within 2^(3 − bits) of this one's, relative to sizes above 1; |γ| = 1.
 
-        The inertia is this one's.  Their own motion is that of any top: see the head of this file.
+        The inertia is unchanged.  Their motion is outside the class: see the head of this file.
         """
         values = [round_to(midpoint(x), bits) for x in self.start(bits + 8)]
         centre = [round_to(midpoint(x), bits) for x in self.moment(bits + 8)]
@@ -85,7 +84,7 @@ class AlgebraicMotion(WithBearing, Algebraic):
         return self.curve.inertia
 
     def moment(self, bits: int) -> list[arb]:
-        """P r with at least so many bits."""
+        """P r to at least ``bits`` bits."""
         square = self.curve.gamma_square()
         return to_bits(lambda _working: [ball(square).sqrt(), arb(0), arb(0)], bits)
 
@@ -110,9 +109,7 @@ class AlgebraicMotion(WithBearing, Algebraic):
         return [*motion[:3], *(component / size for component in motion[3:])]
 
     def bearing(self, time: Fraction) -> Bearing:
-        """See :class:`heavytop.exact.separable.oscillation.WithBearing`: of M, and of what M/x tends to in
-        Chaplygin's at rest.
-        """
+        """The bearing of M; of Chaplygin's motion at rest that of the limit of M/x."""
         return _motion(self).bearing(ball(time))
 
 

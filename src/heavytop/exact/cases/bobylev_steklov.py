@@ -62,8 +62,8 @@ from heavytop.top.heavy_top import HeavyTop, State
 #     ℘(W) = −h/(6 I3) − p²/12,    ℘'(W) = i p s n1/(4 I3),    ℘''(W) = q = s² n1²/(8 I3²) + h p²/(4 I3)
 #     ℘(V) = −2 ℘(W) + m²/4,  ℘'(V) = −℘'(W) − m (℘(V) − ℘(W)),  m = q/℘'(W),    κ = n1 s/(4 I3 p) + h p/(2 n1 s)
 #
-# All rational but s.  Nothing is divided by what depends on the time: the poles γ = ±s e3 of Λ, turning points, M ∥ γ
-# and the separatrix are states like any other.  For p = 0 axis 3 rests in space. Source: derived here; Hermite's
+# All of these but s are rational.  No divisor depends on the time: the poles γ = ±s e3 of Λ, turning points, M ∥ γ and
+# the separatrix need no special case.  For p = 0 axis 3 rests in space.  Source: derived here; Hermite's
 # theorem as in :mod:`heavytop.exact.elliptic.quartic`.
 
 
@@ -114,12 +114,12 @@ class BobylevSteklov(ClosedForm):
         return [p, arb(0), x, top + bend * (x * x), side * slope, up * x]
 
     def xi_at(self, time: Fraction) -> list[arb]:
-        """At t = 0 ``initial_xi`` of γ; raises InputError for γ = 0."""
+        """ξ from ``initial_xi`` of γ; raises InputError for γ = 0."""
         with series_length(2):
             return carried_xi(self.start.gamma, partial(self._carried, time))
 
     def _carried(self, time: Fraction, basis: Vector) -> tuple[list[arb], list[arb]]:
-        """The vector :func:`across` γ, fixed in space, and γ × it/|γ| at ``time``."""
+        """The vector b = :func:`across` γ, fixed in space, and γ × b/|γ| at ``time``."""
         with series_length(1):
             gamma = self.evaluate(time)[3:]
         rate = self.start.omega[0]
@@ -138,7 +138,7 @@ class BobylevSteklov(ClosedForm):
 
 @dataclass(frozen=True, slots=True)
 class _Lattice:
-    """All that does not depend on the time.
+    """The constants of a motion at one working precision.
 
     amplitude: σ√α.  steep: the factor of x'.  crossing: where x goes through 0 (cn, not dn).
     shares: p, and the constant and the factors of x², x' and x in γ.
@@ -162,7 +162,7 @@ class _Lattice:
 
 @cached_per_precision
 def _lattice(case: BobylevSteklov) -> _Lattice | None:
-    """None where nothing moves."""
+    """The constants of the motion; None in equilibrium."""
     if not any(heavy_top(case.system.parameters(case.top, case.start), case.start.flat)):
         return None
     i3, n1, (p, _, x), gamma = case.top.inertia[2], case.top.moment[0], case.start.omega, case.start.gamma

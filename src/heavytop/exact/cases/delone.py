@@ -76,9 +76,9 @@ MOST_TERMS = 1 << 16
 
 @dataclass(frozen=True, slots=True)
 class DeloneAzimuth:
-    """Λ beside a motion of Delone's at one working precision.
+    """The azimuth Λ of a motion of Delone's at one working precision.
 
-    gap: of V.  origin: t' = 0 in its integral.  integral: of Λ, but for (l/2) t'.  None where l = 0 and Λ rests.
+    gap: of V.  origin: its integral at t' = 0.  integral: Λ − (l/2) t'; None where l = 0 and Λ is constant.
     """
 
     level: KovalevskayaLevel
@@ -88,10 +88,10 @@ class DeloneAzimuth:
 
     @classmethod
     def of(cls, level: KovalevskayaLevel) -> DeloneAzimuth:
-        """At the working precision.
+        """The azimuth at the working precision.
 
-        Raises Undecided where it does not suffice, OutOfReach for e = 0, a double root of the cubic, and Fourier series
-        of too many terms.
+        Raises Undecided where that does not suffice, OutOfReach for e = 0, a double root of the cubic, and Fourier
+        series of too many terms.
         """
         cubic, e = level.cubic(), level.double()
         if e == 0 or cubic.gcd(cubic.derivative()).degree() > 0:
@@ -100,7 +100,7 @@ class DeloneAzimuth:
         curve = [PhiRoot(acb(value), 1, True) for value, _ in roots]
         start = start_of(level)
         interval = interval_of(0, curve, start)
-        # beyond the cubic's roots, or between them and 0, where the other variable rests
+        # beyond the roots of the cubic, or between them and 0, where the other variable rests
         mu, _ = pole([*curve, PhiRoot(acb(0), 2, False)], [interval])
         gap, offset = _gap(curve, interval, mu), ball(e) - mu
         with series_length(2):
@@ -178,9 +178,7 @@ class Delone(WithBearing, ClosedForm):
         return state if length > 1 else [constant(part) for part in state]
 
     def bearing(self, time: Fraction) -> Bearing:
-        """See :class:`heavytop.exact.separable.oscillation.WithBearing`: not on the degenerate levels, nor very
-        near them.
-        """
+        """The bearing of v; raises OutOfReach on the degenerate levels and very near them."""
         azimuth = _azimuth(self)
         with series_length(1):
             return azimuth.bearing(time, self.evaluate(time))

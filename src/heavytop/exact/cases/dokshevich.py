@@ -106,7 +106,7 @@ class _Constants:
 
 
 class _Swing:
-    """The motion in x, in units of √B and 1/(β√B), at one working precision: v from its place and the sign of z there.
+    """The motion in x, in units of √B and 1/(β√B), at one working precision, from v and z at t = 0.
 
     side: the sign of x.
     """
@@ -121,7 +121,7 @@ class _Swing:
         self.origin = self.gap.integrals(self.gap.phase(v, -z * v * self.gap.density(v)))[0]
 
     def phase(self, time: arb) -> tuple[arb, int]:
-        """θ and whole turns at a time in own units; raises Undecided where the working precision does not prove it."""
+        """θ and whole turns at a time in these units; raises Undecided where the working precision is too low."""
         return phase_at(self.gap, self.origin + time)
 
     def state(self, phase: Balls) -> tuple[list[Balls], list[Balls]]:
@@ -134,7 +134,7 @@ class _Swing:
 
     @cached_per_precision
     def azimuth(self) -> Azimuth:
-        """That of M about γ."""
+        """The azimuth of M about γ."""
         c = self.constants
         lead, constant = 1 + c.slope * c.slope + c.lead, 2 * c.slope + c.middle
         roots, scale = list(self.ends), -c.lead
@@ -286,7 +286,7 @@ class Dokshevich(_Moving, ClosedForm):
 
     def __post_init__(self) -> None:
         ClosedForm.__post_init__(self)
-        # x may all but rest, and the Fourier series of the integral be too long
+        # the range of x may be so small that the Fourier series of the integral is too long
         decide(self.swing, "The range of M·r is a point", _LEAST)
 
     @once
@@ -317,8 +317,8 @@ class Dokshevich(_Moving, ClosedForm):
 class AlgebraicDokshevich(_Moving, Algebraic):
     """A motion of Dokshevich of a top with given moments: n and the start are algebraic numbers, B = 1, |γ| = 1.
 
-    inertia: I1, I2, I3, I2 between the others.  place: where M·r/|r| stands at t = 0 in its range, from 0 to 1; a
-    negative number for the range of negative M·r.  Raises InputError for moments that no such body has.
+    inertia: I1, I2, I3, I2 between the others.  place: of M·r/|r| at t = 0 in its range, from 0 to 1; negative in the
+    range of negative M·r.  Raises InputError for moments that no such body has.
     """
 
     inertia: Vector
@@ -368,7 +368,7 @@ class AlgebraicDokshevich(_Moving, Algebraic):
         return _Swing(c, v, c.square(v).sqrt(), sign(self.place))
 
     def moment(self, bits: int) -> list[arb]:
-        """P r = |n| e1 with |n| = β κ/b, with at least so many bits."""
+        """P r = |n| e1 with |n| = β κ/b, to at least ``bits`` bits."""
 
         def evaluate(_working: int) -> list[arb]:
             frame, c = self.frame(), self._constants()
@@ -384,8 +384,7 @@ class AlgebraicDokshevich(_Moving, Algebraic):
 def dokshevich_motion(inertia: Iterable[Any], place: Any = Fraction(1, 2)) -> AlgebraicDokshevich:
     """Dokshevich's motion of the Hess top with these moments, I2 between I1 and I3.
 
-    place: where M·r/|r| stands at t = 0, see :class:`AlgebraicDokshevich`.  Both are read by
-    :func:`heavytop.precision.exact`.
+    place: of M·r/|r| at t = 0, as in :class:`AlgebraicDokshevich`.  Both are read by :func:`heavytop.precision.exact`.
     Raises InputError without such a top, and for a place out of range.
     """
     with prefixed("place"):

@@ -58,7 +58,7 @@ class Euler(WithAttitude):
 
     @property
     def steady(self) -> bool:
-        """Ω × M = 0: Ω stays what it is."""
+        """Whether Ω is constant: Ω × M = 0."""
         omega = self.start.omega
         return not any(cross(omega, self.top.angular_momentum(omega)))
 
@@ -71,7 +71,7 @@ class Euler(WithAttitude):
 
 @dataclass(frozen=True, slots=True)
 class _Lattice:
-    """All that does not depend on the time, at one working precision.
+    """The constants of a motion at one working precision.
 
     axes: (a, b, c).  shares: I/L.  amplitudes: A by axis.  rate: p.  origin: u0.  wave: the theta quotient of e^{iψ}.
     drift: μ, per unit of time.  frame: M/L, the projection of e_b across it and their cross product at t = 0.
@@ -90,7 +90,7 @@ class _Lattice:
     turn: acb
 
     def motion(self, time: Balls) -> tuple[list[Balls], Carry]:
-        """Ω, and what carries vectors fixed in space."""
+        """Ω, and the map of vectors fixed in space."""
         a, b, c = self.axes
         u = self.rate * time + self.origin
         sn, cn, dn = self.functions.functions(u)
@@ -103,7 +103,7 @@ class _Lattice:
         square = along[i] * along[i] + along[j] * along[j]
 
         def carry(vector: Sequence[Any]) -> list[BallLike]:
-            # what stays: the part along M, and the one across as a factor of the wave
+            # conserved: the part along M, and the part across it as a factor of the wave
             part, projection, across = (dot(vector, axis) for axis in self.frame)
             rotated = acb(projection, -across) * self.turn * turning
             x, y = real(rotated), imag(rotated) / square
@@ -117,7 +117,7 @@ class _Lattice:
 
 @cached_per_precision
 def _lattice(case: Euler) -> _Lattice | None:
-    """None for a steady rotation."""
+    """The constants of the motion; None for a steady rotation."""
     if case.steady:
         return None
     inertia, omega = case.top.inertia, case.start.omega

@@ -1,14 +1,14 @@
 """Goryachev-Chaplygin: I1 = I2 = 4 I3, c = 0, M·γ = 0, by inversion of Abel's integrals; Sretensky's gyrostat too.
 
 Sretensky's gyrostat is that top with a rotor along axis 3, on M·γ = 0 with M = IΩ + k.  The centre of mass may lie
-anywhere in the plane of the equal moments, and |γ| be anything but 0.  The separated variables move along a straight
-line in Abel's integrals, at a cost that does not depend on the time; the attitude is beside them.
+anywhere in the plane of the equal moments, and γ ≠ 0 have any length.  The separated variables move along a straight
+line in Abel's integrals, at a cost that does not depend on the time; the attitude is one more integral.
 
-Levels where f has a multiple root are found exactly.  Where it lies outside both gaps they are levels like any other.
-Where one variable tends to it the motion is asymptotic (:mod:`heavytop.exact.separable.oscillation`), and one may rest
-on it (:mod:`heavytop.exact.separable.abel`).  Motions where both tend to it (G = 0; without a rotor:
+Levels where f has a multiple root are found exactly.  A multiple root outside both gaps needs no special case.  Where
+one variable tends to it the motion is asymptotic (:mod:`heavytop.exact.separable.oscillation`), and one variable may
+rest on it (:mod:`heavytop.exact.separable.abel`).  Motions where both variables tend to it (G = 0; without a rotor:
 :mod:`heavytop.exact.cases.goryachev_chaplygin_rest`) or both rest are refused; so are motions so near to them that the
-Fourier series do not resolve them, with the distance. Source: Chaplygin, Trudy otd. fiz. nauk 12 (1904); L. N.
+Fourier series do not resolve them, with the distance.  Source: Chaplygin, Trudy otd. fiz. nauk 12 (1904); L. N.
 Sretensky, Doklady Akad. Nauk SSSR 149 (1963) 292.
 """
 
@@ -97,7 +97,7 @@ class GoryachevLevel(Reduced):
         return polynomial(-4 * (w1 * w1 + w2 * w2), -self.axial_momentum, Fraction(1))
 
     def resting(self) -> Fraction | None:
-        """The double root of f where u1 or u2 rests; 0 where both rest, None where none does."""
+        """The double root of f at which u1 or u2 rests; 0 where both rest, None where none does."""
         sextic = self.sextic()
         common = self.separated().gcd(sextic.gcd(sextic.derivative()))
         if common.degree() != 1:
@@ -108,19 +108,19 @@ class GoryachevLevel(Reduced):
 
 @dataclass(frozen=True, slots=True)
 class Root:
-    """A root of f: how often it is one of au − X, and of au + X."""
+    """A root of f.  counts: its multiplicities as a root of au − X and of au + X."""
 
     value: acb
     counts: tuple[int, int]
 
     @property
     def multiplicity(self) -> int:
-        """As a root of f."""
+        """The multiplicity as a root of f."""
         return sum(self.counts)
 
 
 def roots(level: GoryachevLevel) -> list[Root]:
-    """The roots of f at the working precision; raises Undecided where it does not tell their factor."""
+    """The roots of f at the working precision; raises Undecided where it does not determine their factor."""
     h, constant, a = ball(level.energy), 4 * ball(level.third), size_of(level)
     rotor = ball(level.rotor)
     roots_in_order: list[Root] = []
@@ -143,7 +143,7 @@ def size_of(level: GoryachevLevel) -> arb:
 
 
 def separated_start(level: GoryachevLevel) -> tuple[arb, arb]:
-    """u1, u2 at t = 0; of the two the one that cancels comes from the product."""
+    """u1, u2 at t = 0; the smaller one follows from the product, without cancellation."""
     (w1, w2, _), axial = level.omega, level.axial_momentum
     square = w1 * w1 + w2 * w2
     larger = (abs(ball(axial)) + ball(axial * axial + 16 * square).sqrt()) / 2
@@ -152,9 +152,9 @@ def separated_start(level: GoryachevLevel) -> tuple[arb, arb]:
 
 
 def gap_ends(level: GoryachevLevel, curve: Sequence[Root], values: Sequence[arb]) -> list[tuple[int, int]]:
-    """Between which two real roots u1 and u2 move; the same root twice for a variable that stays there.
+    """The indices of the two real roots between which u1 and u2 move; twice the same index for a variable at rest.
 
-    Raises Undecided where the balls do not tell.
+    Raises Undecided where the balls do not determine them.
     """
     resting = _resting(level, curve)
     real = [i for i in ordered([root.value for root in curve]) if i not in resting.values()]
@@ -166,7 +166,7 @@ def gap_ends(level: GoryachevLevel, curve: Sequence[Root], values: Sequence[arb]
 
 
 def _resting(level: GoryachevLevel, curve: Sequence[Root]) -> dict[int, int]:
-    """The variable that rests at a double root, if one does, and the number of that root."""
+    """The index of the double root at which a variable rests, by that variable."""
     double_root = level.resting()
     if double_root is None:
         return {}
@@ -197,7 +197,7 @@ def _resting(level: GoryachevLevel, curve: Sequence[Root]) -> dict[int, int]:
 #     r = u1 + u2 − λ    p = σ (α1β2 + α2β1)/(4a)           q = −σ (β1β2 − α1α2)/(4a)
 #     γ1 = −(X(u1) − X(u2))/(c (u1 − u2))     γ2 = −(α1β1 + α2β2)/(c (u1 − u2))     γ3 = −σ (α1β2 − α2β1)/(c (u1 − u2))
 #
-# so that turning points are points like any other.  σ is found by exclusion at the start.
+# so that turning points need no special case.  σ is found by exclusion at the start.
 # Source: Chaplygin, Trudy otd. fiz. nauk 12 (1904); L. N. Sretensky, Doklady Akad. Nauk SSSR 149 (1963) 292.
 # Signs, recovery and the place of λ derived here from the integrals (tests/exact/test_sretensky.py).
 
@@ -210,7 +210,7 @@ _MINUS, _PLUS = 0, 1
 class GoryachevMotion:
     """The motion of a level at one working precision.
 
-    moment, size: c and a.  ends: numbers of the roots at both ends of each gap.  sign: σ.
+    moment, size: c and a.  ends: indices of the roots at both ends of each gap.  sign: σ.
     """
 
     level: GoryachevLevel
@@ -223,9 +223,9 @@ class GoryachevMotion:
 
     @classmethod
     def of(cls, level: GoryachevLevel) -> GoryachevMotion:
-        """At the working precision.
+        """The motion at the working precision.
 
-        Raises Undecided where it does not suffice, OutOfReach where the Fourier series need too many terms.
+        Raises Undecided where that does not suffice, OutOfReach where the Fourier series need too many terms.
         """
         curve, values = roots(level), separated_start(level)
         ends = gap_ends(level, curve, values)
@@ -258,7 +258,7 @@ class GoryachevMotion:
             return self.level.restored(self.turned(moving, turns))
 
     def phases(self, time: Fraction) -> tuple[list[arb], list[int]]:
-        """The phases at ``time`` in the first turns, and whole turns; see :meth:`Line.phases`."""
+        """The phases at ``time`` in the first turns, and whole turns, as :meth:`Line.phases`."""
         return self.line.phases(ball(time * self.level.rate))
 
     def _rates(self, u1: Balls, u2: Balls) -> list[Balls]:
@@ -294,7 +294,7 @@ class GoryachevMotion:
             value, others = phase * 0 + 1, phase * 0 + arb(1) / 2
             for number, root in enumerate(self.curve):
                 if root.counts[factor] and number in at_end:
-                    # no power: FLINT takes logarithms for that, of 0 at a turning point
+                    # no power: FLINT would take the logarithm of 0 at a turning point
                     value *= side * at_end[number] * (at_end[number] if root.counts[factor] > 1 else 1)
                 elif root.counts[factor]:
                     others *= _distance(u, root.value, root.counts[factor], gap.middle)
@@ -331,13 +331,13 @@ def _distance(u: BallLike, root: acb, many: int, middle: arb) -> Any:
 # (tests/exact/test_goryachev_chaplygin_attitude.py).
 #
 # Strips.  In s, up to signs, u' = αβ, α' = ½ (a − X'(u)) β, β' = ½ (a + X'(u)) α, X'(u) = 3u²/2 − 2λu − h: polynomials.
-# From any real s the solution goes on upwards, s + iy, where it stays within (A, B, C) of (u, α, β) at s, as long as
+# From any real s the solution continues to s + iy, and stays within (A, B, C) of its (u, α, β) at s, as long as
 #
 #     A' = (|α| + B)(|β| + C),   B' = ½ (|a − X'| + E)(|β| + C),   C' = ½ (|a + X'| + E)(|α| + B)
 #
 # with E = (3|u| + 2|λ|)A + 3A²/2
 #
-# has a solution from 0 that is finite, and so it is analytic on the strip where this holds from every real s.
+# has a finite solution from 0; so it is analytic on the strip where this holds from every real s.
 
 
 _CELLS, _BOUND_BITS = 256, 64
@@ -345,14 +345,14 @@ _GROWTH, _STEPS = 30.0, 200
 _ROUNDING = 1 + 1e-12
 """More than the rounding of a few sums and products of positive floats."""
 _ROOM = 0.45
-"""The part of the way to the other gap that u1 and u2 may go on the strips."""
+"""The share of the distance to the other gap that u1 and u2 may move on the strips."""
 
 
 @dataclass(frozen=True, slots=True)
 class Strip:
-    """Where u, α, β are analytic in s.
+    """A strip |Im s| ≤ ``height`` on which u, α, β are analytic.
 
-    height: |Im s| is at most that.  largest: bounds on |α| and |β| there.
+    largest: bounds of |α| and |β| there.
     """
 
     height: float
@@ -360,7 +360,7 @@ class Strip:
 
     @classmethod
     def of(cls, motion: GoryachevMotion, gap: Gap, other: arb) -> Strip:
-        """u stays nearer to where it is at Im s = 0 than _ROOM of the way to ``other``, the end of the other gap."""
+        """The strip on which u moves by less than _ROOM of its distance to ``other``, the end of the other gap."""
         middle, alpha, beta, less, more, away = _sizes(motion, gap, other)
         room, twice = _ROOM / _ROUNDING * away, 2 * _ROUNDING * float(abs(motion.level.rotor))
         distances = [np.zeros(_CELLS)] * 3
@@ -373,7 +373,7 @@ class Strip:
 
         for _ in range(5 * _STEPS):
             sizes = room, scale + distances[1], scale + distances[2]
-            # a step of the solution is below what no point of its own step leaves
+            # a step of the solution stays below a bound that no point of its own step exceeds
             wide = [x + size / _STEPS for x, size in zip(distances, sizes, strict=True)]
             slopes = rates(wide)
             step = min(float((size / slope).min()) for size, slope in zip(sizes, slopes, strict=True)) / _STEPS
@@ -414,7 +414,10 @@ class Uniform:
 
     @classmethod
     def of(cls, motion: GoryachevMotion, variable: Variable, other: arb) -> Uniform:
-        """other: the end of the other gap.  Raises OutOfReach for a variable that tends to a double root."""
+        """The uniform phase of a variable.
+
+        other: the end of the other gap.  Raises OutOfReach for a variable that tends to a double root.
+        """
         if isinstance(variable, Rest):
             size, middle = motion.size, abs(variable.middle)
             bound = float((2 * size * middle).sqrt().upper()) * _ROUNDING
@@ -431,7 +434,7 @@ class Uniform:
         return arb(0) if self.gap is None else 1 / self.gap.means[0]
 
     def phases(self, count: int) -> list[arb]:
-        """θ where φ is at each of the points."""
+        """θ at the points of φ."""
         if self.gap is None:
             return [arb(0)]
         inversion, phases = Inversion((self.gap,), (1,)), []
@@ -441,13 +444,13 @@ class Uniform:
         return phases
 
     def passed(self, phase: arb, turns: int) -> arb:
-        """s = F_0 at the phase after so many turns."""
+        """s = F_0 at the phase after whole turns."""
         return arb(0) if self.gap is None else self.gap.integrals(phase)[0] + turns * self.gap.column[0]
 
 
 @dataclass(frozen=True, slots=True)
 class GoryachevChaplyginAttitude:
-    """The azimuth Λ of M beside a motion, at one working precision.
+    """The azimuth Λ of M at one working precision.
 
     uniform: the phases φ.  began: s of both variables at t = 0.  integral: of dΛ/ds from there.
     """
@@ -459,9 +462,9 @@ class GoryachevChaplyginAttitude:
 
     @classmethod
     def of(cls, motion: GoryachevMotion) -> GoryachevChaplyginAttitude:
-        """Beside ``motion``, at its working precision.
+        """The azimuth of ``motion``, at its working precision.
 
-        Raises Undecided where it does not suffice, OutOfReach for Fourier series of too many terms and for asymptotic
+        Raises Undecided where that does not suffice, OutOfReach for Fourier series of too many terms and for asymptotic
         motions.
         """
         first, second = motion.line.variables
@@ -492,7 +495,7 @@ class GoryachevChaplyginAttitude:
         """M in the top's own axes, and Λ.  Raises Undecided where the working precision does not prove the phases."""
         phases, turns = self.motion.phases(time)
         passed = _passed(self.uniform, phases, turns)
-        # the same for both, but for one at rest
+        # the same for both, unless one is at rest
         moving = 1 if self.uniform[0].gap is None else 0
         angles = [phase.rate * s for phase, s in zip(self.uniform, passed, strict=True)]
         p, q, r, *gamma = self.motion.turned(phases, turns)
@@ -527,7 +530,7 @@ digits.
 class GoryachevChaplygin(WithBearing, ClosedForm):
     """A motion of the Goryachev-Chaplygin top with the small moment on axis 3.
 
-    Raises NotInClass unless I1 = I2 = 4 I3, P c = 0, P r ≠ 0, M·γ = 0 and γ ≠ 0, and on the levels not done.
+    Raises NotInClass unless I1 = I2 = 4 I3, P c = 0, P r ≠ 0, M·γ = 0 and γ ≠ 0, and on the levels not covered.
     """
 
     method = "closed form: Goryachev-Chaplygin, inversion of Abel's integrals"
@@ -543,9 +546,7 @@ class GoryachevChaplygin(WithBearing, ClosedForm):
         return _motion(self).at(time, current_length())
 
     def bearing(self, time: Fraction) -> Bearing:
-        """See :class:`heavytop.exact.separable.oscillation.WithBearing`: not for asymptotic motions, nor to
-        very many digits.
-        """
+        """The bearing of M; raises OutOfReach for asymptotic motions and for very many digits."""
         return _attitude(self).bearing(time)
 
 
@@ -554,7 +555,7 @@ class Sretensky(GoryachevChaplygin):
     """A motion of Sretensky's gyrostat with the small moment and the rotor on axis 3.
 
     Raises NotInClass unless I1 = I2 = 4 I3, P c = 0, P r ≠ 0, k1 = k2 = 0, M·γ = 0 with M = IΩ + k, and γ ≠ 0, and on
-    the levels not done.
+    the levels not covered.
     """
 
     method = "closed form: Sretensky's gyrostat, inversion of Abel's integrals"
@@ -574,7 +575,7 @@ def _motion(case: GoryachevChaplygin) -> GoryachevMotion:
 
 
 def _require_done(level: GoryachevLevel) -> None:
-    """Raises NotInClass on the levels that are not done here, and too near to them."""
+    """Raise NotInClass on the levels that are not covered, and too near to them."""
     resting = level.resting()
     if resting == 0:
         raise LevelNotDone("The level is degenerate: both separated variables rest, or one rests at 0.", REMEDY)

@@ -71,8 +71,7 @@ def _off_axis(_top: HeavyTop, start: State) -> Sequence[Fraction]:
 
 @dataclass(frozen=True, slots=True)
 class GoryachevChaplyginRest(WithBearing, ClosedForm):
-    """A motion of the Goryachev-Chaplygin top, the small moment on axis 3, that starts at rest, comes to it or tends
-    to it.
+    """A motion of the Goryachev-Chaplygin top, the small moment on axis 3, that is at rest at some time or tends to it.
 
     Raises NotInClass unless I1 = I2 = 4 I3, P c = 0, P r ≠ 0, M·γ = 0, G = 0 and h² ≤ a², all exactly, and for
     rotations about axis 3 and equilibria.
@@ -95,7 +94,7 @@ class GoryachevChaplyginRest(WithBearing, ClosedForm):
     )
 
     def own_time(self, time: Fraction) -> Fraction:
-        """In the level's unit."""
+        """``time`` in the unit of the level."""
         return GoryachevLevel.of(self.top, self.start).rate * time
 
     def evaluate(self, time: Fraction) -> list[BallLike]:
@@ -104,7 +103,7 @@ class GoryachevChaplyginRest(WithBearing, ClosedForm):
         return level.restored(motion.state(instant(level.rate * time)))
 
     def bearing(self, time: Fraction) -> Bearing:
-        """See :class:`heavytop.exact.separable.oscillation.WithBearing`: M, along γ × n at rest; not for h = a."""
+        """The bearing of M, along γ × n at rest; raises OutOfReach for h = a."""
         motion = _motion(self)
         if isinstance(motion, UprightMotion):
             raise OutOfReach("The azimuth of M is not known for h = a.", "Integrate the attitude along with it.")
@@ -132,7 +131,7 @@ def _speeds(level: GoryachevLevel) -> list[tuple[arb, arb]]:
 
 
 def _the_one(level: GoryachevLevel, possible: Sequence[Signed]) -> Signed:
-    """The motion, of two that differ in σ, that starts as the level says; raises Undecided where balls do not tell."""
+    """The motion, of two that differ in σ, with the start of the level; raises Undecided where balls do not decide."""
     with series_length(1):
         start = level.turned()
         return the_only(
@@ -212,7 +211,7 @@ class RestMotion:
         return self.at(time).state()
 
     def at(self, time: BallLike) -> PathPoint:
-        """The place at a number or series."""
+        """The point of the path at a number or series."""
         root = self.size.sqrt()
         s, k, delta = self.functions.functions(time * (root / 2) + self.origin)
         g2, g3 = self.across * self.across, self.upright * self.upright
@@ -237,7 +236,7 @@ class RestMotion:
             return 1 / (w1.sqrt(analytic=analytic) * w2.sqrt(analytic=analytic) * (share1 * w2 + share2 * w1))
 
         middle = acb(end.mid())
-        # FLINT integrates to exact ends; the rest by the mean value theorem
+        # FLINT integrates to exact ends; the mean value theorem covers the radius
         total = (acb(end) - middle) * slope(acb(end), False) + acb.integral(slope, acb(0), middle)
         if next(evaluations) > _MOST_VALUES:
             raise OutOfReach(
@@ -250,9 +249,9 @@ class RestMotion:
 
 @dataclass(frozen=True, slots=True)
 class PathPoint:
-    """One place of a motion, a number or series.
+    """A point of the path of a motion, with numbers or series.
 
-    lift: x.  side: −1 where 1/p1 and 1/p2 are in the place of p1 and p2.
+    lift: x.  side: −1 where 1/p1 and 1/p2 replace p1 and p2.
     """
 
     motion: RestMotion

@@ -75,7 +75,7 @@ class Grioli(WithAttitude):
 
 
 def gamma_of(top: HeavyTop, omega: Vector) -> list[Fraction]:
-    """The γ that goes with Ω, times nothing: every root has cancelled."""
+    """The γ that belongs to Ω, a rational function: all roots cancel."""
     (i1, i2, i3), n = top.inertia, top.moment
     square, spin = dot(n, n), dot(omega, n)
     kappa = n[0] * n[2] * (i1 - i3) / square

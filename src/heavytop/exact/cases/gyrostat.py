@@ -1,13 +1,13 @@
 """The gyrostat: M' = M × ω, γ' = γ × ω, ω = Ω + λ e2, for any inertia, rotor and start.
 
-What the paper's (2.1)-(2.4) solve exactly, with λ = P b/(M·γ) and γ = M/C0 (Zhukovsky 1885, Volterra 1899; Wittenburg,
-Dynamics of Multibody Systems).  Integrals m² = |M|² and h = ½ M·Ω + λ M2.  With k = 1/I1 − 1/I3 and x = M2,
+The system that the paper's (2.1)-(2.4) solve exactly, with λ = P b/(M·γ) and γ = M/C0 (Zhukovsky 1885, Volterra 1899;
+Wittenburg, Dynamics of Multibody Systems).  Integrals m² = |M|² and h = ½ M·Ω + λ M2.  With k = 1/I1 − 1/I3 and x = M2,
 (2.4) and (2.2) read k M1² = q1(x), k M3² = q3(x), and (2.3) is x'² = q1 q3, inverted by Biermann-Weierstrass:
 
     q1 = 2h − m²/I3 − 2λ x − (1/I2 − 1/I3) x²,    q3 = −[2h − m²/I1 − 2λ x − (1/I2 − 1/I1) x²],    x' = k M1 M3
 
-No root is taken: M1 and M3 are functions of the second kind, V = the half-period ω_e of the root that goes with the
-factors, e = (½ a1 b1 − a0 b2 − a2 b0)/6 for q1 = a0 + a1 x + a2 x², q3 = b0 + b1 x + b2 x², so signs follow the flow.
+No root is taken: M1 and M3 are functions of the second kind, V = the half-period ω_e of the root that belongs to the
+factors, e = (½ a1 b1 − a0 b2 − a2 b0)/6 for q1 = a0 + a1 x + a2 x², q3 = b0 + b1 x + b2 x²: signs follow the motion.
 
 γ, or any vector fixed in space, has a constant part along M; the part Γ across it makes Z = M × Γ − i m Γ, with
 M × Z = −i m Z.
@@ -133,7 +133,7 @@ class Gyrostat(ClosedForm):
 
 @dataclass(frozen=True, slots=True)
 class _Fixed:
-    """A vector fixed in space: share M plus the part across M, of which waves are Z1 and Z3; None where it is 0.
+    """A vector fixed in space: share M plus a part across M, with Z1 and Z3 in ``waves``; None where that part is 0.
 
     turn, square: −1/m and −1/m².
     """
@@ -144,7 +144,7 @@ class _Fixed:
     square: arb
 
     def at(self, momentum: list[Balls], point: Point, inverse: Balls) -> list[Balls]:
-        """In body components at the point."""
+        """Its body components at the point."""
         along = [m * self.share for m in momentum]
         if self.waves is None:
             return along
@@ -155,7 +155,7 @@ class _Fixed:
 
 @dataclass(frozen=True, slots=True)
 class _Prepared:
-    """inverses: 1/I.  gamma: None where M is at rest in the body."""
+    """The constants of a motion.  inverses: 1/I.  gamma: None where M is at rest in the body."""
 
     motion: PreparedMotion
     momentum: Companions

@@ -13,9 +13,9 @@ a spherical pendulum.  tan(φ/2) = v/u, where with ω = NC0/ρ²
     u' = ½ (ω − βρ) v,   v' = −½ (ω + βρ) u
 
 *What "closed form" means here.*  s is an elliptic function.  The linear system has no solution in known functions for
-general moments (Nekrasov; it is a Floquet problem), but its period is that of s: the matrix over one period is made
+general moments (Nekrasov; it is a Floquet problem), but its period is that of s: the matrix over one period is computed
 once, and (u, v) at any time is a power of it applied to the start, so that the cost does not grow with the time.  The
-matrix comes from Taylor polynomials with a proven tail (:mod:`heavytop.exact.cases.hess_transfer`).
+matrix follows from Taylor polynomials with a proven tail (:mod:`heavytop.exact.cases.hess_transfer`).
 
 M·γ = 0 is elementary in the angle of a pendulum, below.
 Where the two lower roots coincide, s rests: refused.
@@ -81,7 +81,7 @@ class HessLevel:
 
     @classmethod
     def of(cls, top: HeavyTop, start: State) -> HessLevel:
-        """In units of ordinary size."""
+        """The data in units near 1."""
         rate = Fraction(2) ** unit_of_time(HEAVY_TOP.parameters(top, start), start.flat)
         size = Fraction(2) ** exponent(max(map(abs, start.gamma)))
         i1, i2, i3 = top.inertia
@@ -127,7 +127,7 @@ class HessLevel:
         return 2 * polynomial(self.energy, -one) * limit - polynomial(self.area**2 * square)
 
     def gap(self, most: int = MOST_TERMS) -> Gap:
-        """Where s swings, at the working precision; raises OutOfReach, and Undecided where roots coincide."""
+        """The range of s at the working precision; raises OutOfReach, and Undecided where roots coincide."""
         low, high, top = self.roots()
         if not low < high < top:
             raise Undecided
@@ -166,7 +166,7 @@ class Hess(WithBearing, ClosedForm):
         decide(lambda: plan(_linear(level, level.gap(_MOST_TERMS))), "The level is all but degenerate", _LEAST)
 
     def own_time(self, time: Fraction) -> Fraction:
-        """In the level's unit: the matrix over its period costs much at many bits."""
+        """``time`` in the unit of the level: the matrix over its period is costly at many bits."""
         return HessLevel.of(self.top, self.start).rate * time
 
     def evaluate(self, time: Fraction) -> list[Any]:
@@ -210,9 +210,9 @@ class HessMotion:
 
     @classmethod
     def of(cls, level: HessLevel) -> HessMotion:
-        """At the working precision.
+        """The motion at the working precision.
 
-        Raises Undecided where it does not suffice, OutOfReach where the series need too many terms.
+        Raises Undecided where that does not suffice, OutOfReach where the series need too many terms.
         """
         gap = level.gap()
         energy, area, size = ball(level.energy), ball(level.area), ball(level.moment_square).sqrt()
@@ -240,7 +240,7 @@ class HessMotion:
 
     @cached_per_precision
     def azimuth(self) -> Azimuth:
-        """That of n about γ: Λ' = C0 |γ| N²/(N²|γ|² − s²)."""
+        """The azimuth of n about γ: Λ' = C0 |γ| N²/(N²|γ|² − s²)."""
         low, high, top = self.level.roots()
         gamma = ball(dot(self.level.gamma, self.level.gamma)).sqrt()
         pole = self.size * gamma
@@ -291,13 +291,13 @@ def _exponent(value: arb) -> int:
 #
 #     sin φ = tanh w,   cos φ = ε sech w,   w = w(0) − (β/α)(ϑ − ϑ(0)),   ε = sign cos φ(0)
 #
-# So a pendulum that turns over tends to one about axis 2, both ways in time.  The torque γ × n = N|γ| sin ϑ e is along
-# M: e is fixed in space, and with γ it carries every vector that is. Source: N. E. Zhukovsky, Trudy otd. fiz. nauk 5
-# (1893) 37 (the loxodromic pendulum); derived here from the equations.
+# So a rotating pendulum tends to one about axis 2, forwards and backwards in time.  The torque γ × n = N|γ| sin ϑ e is
+# along M: e is fixed in space, and e and γ determine every vector fixed in space.  Source: N. E. Zhukovsky, Trudy otd.
+# fiz. nauk 5 (1893) 37 (the loxodromic pendulum); derived here from the equations.
 
 
 def _direction(top: HeavyTop, start: State) -> tuple[Fraction, Fraction]:
-    """(N cos φ, sin φ) at t = 0 but for a positive factor: of M, or at rest of the side where sin ϑ > 0."""
+    """(N cos φ, sin φ) at t = 0 up to a positive factor: of M, or at rest of the side where sin ϑ > 0."""
     a, _, c = top.moment
     if any(start.omega):
         m1, m2, m3 = top.angular_momentum(start.omega)
@@ -344,7 +344,7 @@ def _path(case: HessPendulum) -> tuple[_Path, list[list[arb]]]:
 
 @dataclass(frozen=True, slots=True)
 class _Path:
-    """All that does not depend on the time.
+    """The constants of a motion.
 
     inertia: I as balls.  axis, level: e_z and e_x.  length: |γ|.  skew: 2β/α.  side: ε.  begin: w + 2 (β/α) (x/2) at
     t = 0.

@@ -27,7 +27,7 @@ and at most e^(κr) (Gronwall's lemma along a radius), so that its Taylor coeffi
 follows the first L terms at a distance δ < r is at most e^(κr) (δ/r)^L/(1 − δ/r); for V that times the largest √|w/Q|.
 Segments reach r/R to either side of their places and grow away from 0 with the discs; where κr is large they are
 shorter.  There are log(1/β) of them for small β (M·γ all but 0) and κ for large κ (moments of very different size):
-both are counted before any of them is made.
+both are counted before any of them is computed.
 
 *The matrix.*  Y(θ), Y(0) = 1, is the product over segments of 0 ≤ θ ≤ π.  b and c are even, so with J = diag(1, −1)
 Y(−θ) = J Y(θ) J, and the matrix over a period is Y(2π) = J Y(π)⁻¹ J Y(π).  det Y = 1.
@@ -56,7 +56,7 @@ _STEEPEST = 32
 """The largest κr."""
 _ARCS, _BOUND_BITS = 64, 64
 _GUARD, _BLOCK = 32, 16
-"""Bits beyond those that count; terms that are computed in the same bits."""
+"""Guard bits; terms that are computed in the same bits."""
 MOST_SEGMENTS = 96
 _MOST_WORK, _WORK_BITS = 16384, 256
 """Segments times the square of the working precision over so many bits: some 15 s of one core."""
@@ -95,7 +95,7 @@ class System2:
         return 2 * (self.energy / (2 * self.reach)).sqrt().asinh()
 
     def bound(self, centre: float, radius: float) -> tuple[arb, arb]:
-        """κ on the disc and the largest √|w/Q|; not finite where a zero all but lies in it."""
+        """κ on the disc and the largest √|w/Q|; not finite where a zero is too near to it."""
         with working_precision(_BOUND_BITS):
             steepness, widest = arb(0), arb(0)
             # c ((z + b/2c)² + gap): no zero is found where two are near each other
@@ -116,9 +116,9 @@ class System2:
 
 @dataclass(frozen=True, slots=True)
 class Disc:
-    """One about a place, and the segment in it.
+    """A disc about a place, with its segment.
 
-    left, right: its ends.  radius: r.  steepness: κ.  widest: the largest √|w/Q|.
+    left, right: ends of the segment.  radius: r.  steepness: κ.  widest: the largest √|w/Q|.
     """
 
     left: float
@@ -130,14 +130,14 @@ class Disc:
 
     @classmethod
     def of(cls, system: System2, left: float, radius: float) -> Disc:
-        """The one whose segment begins at ``left``."""
+        """The disc whose segment begins at ``left``."""
         angle = left + 2 * atan(radius / RATIO)
         return cls(left, angle, 2 * angle - left, radius, *system.bound(angle, radius))
 
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """Y about one place: polynomials in z of so many terms, u and V of its columns.
+    """Y about one place: polynomials in z for u and V of its columns.
 
     growth: e^(κr).  roots: Q.
     """
@@ -149,7 +149,7 @@ class Segment:
 
     @classmethod
     def of(cls, system: System2, disc: Disc) -> Segment:
-        """At the working precision."""
+        """The segment of a disc at the working precision."""
         growth = (disc.radius * disc.steepness).exp()
         bits = ceil(current_precision() + 8 + log2(float(growth.upper())))
         length, (first, second) = ceil(bits / _RATIO_BITS) + 2, system.quadratics(arb(disc.place))
@@ -203,7 +203,7 @@ def plan(system: System2) -> list[Disc]:
 
 
 def _distance(centre: float, width: float) -> float:
-    """How far z = 0 is from the nearest zero of P, Q and w; farther away from 0 it is no less.
+    """The distance of z = 0 from the nearest zero of P, Q and w, which does not decrease away from 0.
 
     The zeros of Q are farther than those of P: E < top, for the cubic of the height is −K² at E.
     """
@@ -224,9 +224,9 @@ class Transfer:
 
     @classmethod
     def of(cls, system: System2) -> Transfer:
-        """At the working precision.
+        """The matrices at the working precision.
 
-        Raises Undecided where it does not suffice, OutOfReach where there is too much to do at so many bits.
+        Raises Undecided where that does not suffice, OutOfReach where the cost at so many bits is too high.
         """
         planned = plan(system)
         work = len(planned) * (current_precision() / _WORK_BITS) ** 2
@@ -275,7 +275,7 @@ def _series(
     k_p, k_pq, skew = system.torque / p, system.torque / (p * q), system.skew
     skew_p, skew_q, skew_pq = skew * p, skew / q, skew * p / q
     half_p, half_q = p1 / 2, q1 / 2
-    # each behind two zeros: the solution, its quotients by P/p and by w, and what is over Q/q
+    # each preceded by two zeros: the solution, its quotients by P/p and by w, and the quotients by Q/q
     solution = u, _, v, w = tuple([arb(0), arb(0), value] for value in start)
     over_p = u_p, uu_p, v_p, w_p = tuple([arb(0), arb(0)] for _ in solution)
     over_w = u_w, uu_w, v_w, w_w = tuple([arb(0), arb(0)] for _ in solution)

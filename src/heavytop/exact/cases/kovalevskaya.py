@@ -1,17 +1,17 @@
 """Kovalevskaya's top, I1 = I2 = 2 I3, c = 0: every start but those on three kinds of degenerate levels.
 
-The centre of mass may lie anywhere in the plane of the equal moments, and |γ| be anything but 0.  The two separated
+The centre of mass may lie anywhere in the plane of the equal moments, and γ ≠ 0 have any length.  The two separated
 variables (:mod:`heavytop.exact.cases.kovalevskaya_theta`) move along a straight line in Abel's integrals, which are
 inverted in balls: the cost does not depend on the time.  Near levels where
 the curve has a multiple root the Fourier series there grow like the root of the distance; where they need more than
 2^14 terms, theta functions of two variables take over (:mod:`heavytop.exact.cases.kovalevskaya_theta`), down to a
-distance of two roots of 2^-27 of the largest.  Nearer than that the motion is refused, with the distance, and left to
-the enclosure.
+distance of two roots of 2^-27 of the largest.  Nearer than that the motion is refused, with the distance, and the
+enclosure applies.
 
 Levels where the quintic has a multiple root, found exactly (Appelrot, Trudy otd. fiz. nauk 16 (1911)):
 
     k = 0                            Delone's class, elliptic: :mod:`heavytop.exact.cases.delone`
-    double root outside both gaps    as any other level, at any distance from it
+    double root outside both gaps    no special case, at any distance from it
     double root at an end of a gap   asymptotic motions (:mod:`heavytop.exact.separable.oscillation`)
     a variable at rest on it         Appelrot's especially remarkable motions (:mod:`heavytop.exact.separable.abel`);
                                      refused if the other variable passes it
@@ -83,10 +83,10 @@ Interval = tuple[int, int]
 
 
 def intervals(level: KovalevskayaLevel, curve: Sequence[PhiRoot], start: WorkingStart) -> tuple[Interval, Interval]:
-    """Where w1 and w2 move: pairs of numbers of branch points, (lower, upper) in v and so (upper, lower) in w.
+    """The ranges of w1 and w2: pairs of indices of branch points, (lower, upper) in v and so (upper, lower) in w.
 
-    Twice the same number for a variable that stays at a double root.
-    Raises Undecided where the balls do not tell.
+    Twice the same index for a variable at rest at a double root.
+    Raises Undecided where the balls do not determine them.
     """
     resting = _resting(level, curve, start)
     first, second = (
@@ -97,7 +97,7 @@ def intervals(level: KovalevskayaLevel, curve: Sequence[PhiRoot], start: Working
 
 
 def interval_of(variable: int, curve: Sequence[PhiRoot], start: WorkingStart, resting: Sequence[int] = ()) -> Interval:
-    """Where w1 (variable 0) or w2 moves, as :func:`intervals`; resting: roots where another variable stays."""
+    """The range of w1 (variable 0) or w2, as in :func:`intervals`; resting: roots at which another variable rests."""
     real = [i for i in ordered([root.value for root in curve]) if i not in resting]
     between = alternate(real, [root.multiplicity for root in curve], True)
     holding = [
@@ -110,7 +110,7 @@ def interval_of(variable: int, curve: Sequence[PhiRoot], start: WorkingStart, re
 
 
 def _resting(level: KovalevskayaLevel, curve: Sequence[PhiRoot], start: WorkingStart) -> dict[int, int]:
-    """The variable that rests at a double root, if any, and the number of that root."""
+    """The index of the double root at which a variable rests, by that variable."""
     double = [i for i, root in enumerate(curve) if root.multiplicity > 1]
     if not double or level.separated(level.double()) != 0:
         return {}
@@ -118,7 +118,7 @@ def _resting(level: KovalevskayaLevel, curve: Sequence[PhiRoot], start: WorkingS
 
 
 def pole(curve: Sequence[PhiRoot], occupied: Sequence[Interval]) -> tuple[arb, float]:
-    """μ, outside both gaps, where the branch points in v come to lie as far from the gaps as possible; and how far."""
+    """μ outside both gaps for which the branch points in v are farthest from the gaps, and that distance."""
     real = ordered([root.value for root in curve])
     occupied_pairs = {(upper - 1, lower - 1) for upper, lower in occupied}
     lowest, highest = (curve[i].value.real.mid() for i in (real[0], real[-1]))
@@ -188,9 +188,9 @@ class AbelMotion:
 
     @classmethod
     def of(cls, level: KovalevskayaLevel, most: int) -> AbelMotion:
-        """At the working precision.
+        """The motion at the working precision.
 
-        Raises Undecided where it does not suffice, OutOfReach for Fourier series of more than ``most`` terms.
+        Raises Undecided where that does not suffice, OutOfReach for Fourier series of more than ``most`` terms.
         """
         start, curve = start_of(level), roots(level)
         ends = intervals(level, curve, start)
@@ -213,7 +213,7 @@ class AbelMotion:
             return self.level.restored(self.reduced(*self.phases(time), length))
 
     def phases(self, time: Fraction) -> tuple[list[arb], list[int]]:
-        """The phases at ``time`` in the first turns, and whole turns; see :meth:`Line.phases`."""
+        """The phases at ``time`` in the first turns, and whole turns, as :meth:`Line.phases`."""
         return self.line.phases(ball(time * self.level.rate))
 
     @property
@@ -230,7 +230,7 @@ class AbelMotion:
     def approach(self, phases: Sequence[arb], turns: Sequence[int]) -> arb | None:
         """(log q √((w1 − e)(w2 − e)))' in t' where one variable tends to a double root e; None where none does.
 
-        The number under the logarithm goes to 0, its rate of change is as exact as the phases.
+        The argument of the logarithm tends to 0; its rate of change is as exact as the phases.
         """
         for variable, (low, high) in zip(self.variables, self.ends, strict=True):
             if not isinstance(variable, Approach):
@@ -407,7 +407,7 @@ def start_phases(start: WorkingStart, mu: arb, variables: Sequence[Variable]) ->
 
 @dataclass(frozen=True, slots=True)
 class KovalevskayaAttitude:
-    """The azimuth beside a motion, at one working precision.
+    """The azimuth of a motion at one working precision.
 
     integrals: of each variable; none where Λ is uniform.  side: the sign of f.
     """
@@ -418,9 +418,10 @@ class KovalevskayaAttitude:
 
     @classmethod
     def of(cls, motion: AbelMotion, most: int) -> KovalevskayaAttitude:
-        """Beside ``motion``, at its working precision.
+        """The azimuth of ``motion``, at its working precision.
 
-        Raises Undecided where it does not suffice, OutOfReach for Fourier series of more than ``most`` terms and where
+        Raises Undecided where that does not suffice, OutOfReach for Fourier series of more than ``most`` terms and
+        where
         a variable rests: there v = 0.
         """
         level = motion.level
@@ -444,7 +445,7 @@ class KovalevskayaAttitude:
         state = [x[0] for x in reduced]
         vector, angle = level_vector(level, state), arb(0)
         rate = self.motion.approach(phases, turns)
-        # with q near 0 the vector itself is known well enough
+        # with q near 0 the vector itself is accurate enough
         if rate is not None and level.area != 0 and not state[1].contains(0):
             vector, angle = [2 * state[0], 2 * state[1], state[2]], _of_momentum(level, state, rate, self.side)
         return Bearing.of(level.in_body(state[3:]), level.in_body(vector), azimuth - angle)
@@ -499,7 +500,7 @@ def _integral(variable: Variable, offset: arb, weight: arb, most: int) -> Azimut
 
 MOST_TERMS = 1 << 14
 SEPARATION = 2.0**-27
-"""Where two roots are nearer than this, over the largest, the periods are not integrated."""
+"""The smallest distance of two roots, over the largest, at which periods are integrated."""
 _DISTANCE = 3e-4
 """cosh β − 1 of :func:`pole` where the Fourier series take :data:`MOST_TERMS` terms for 50 digits."""
 
@@ -508,7 +509,7 @@ _DISTANCE = 3e-4
 class Kovalevskaya(WithBearing, ClosedForm):
     """A motion of Kovalevskaya's top with the small moment on axis 3.
 
-    Raises NotInClass unless I1 = I2 = 2 I3, P c = 0, P r ≠ 0 and γ ≠ 0, and on and near the levels that are not done.
+    Raises NotInClass unless I1 = I2 = 2 I3, P c = 0, P r ≠ 0 and γ ≠ 0, and on and near the levels not covered.
     """
 
     method = "closed form: Kovalevskaya, inversion of Abel's integrals"
@@ -524,9 +525,7 @@ class Kovalevskaya(WithBearing, ClosedForm):
         return _motion(self).at(time, current_length())
 
     def bearing(self, time: Fraction) -> Bearing:
-        """See :class:`heavytop.exact.separable.oscillation.WithBearing`: not where a variable rests, nor very
-        near M·γ = 0.
-        """
+        """The bearing of v; raises OutOfReach where a variable rests and very near M·γ = 0."""
         return _attitude(self).bearing(time)
 
     def exponent(self, bits: int) -> arb:
@@ -590,7 +589,7 @@ def _has_thetas(level: KovalevskayaLevel) -> bool:
 
 
 def _require_done(level: KovalevskayaLevel) -> None:
-    """Raises NotInClass on the levels that are not done here."""
+    """Raise NotInClass on the levels that are not covered."""
     cubic, double = level.cubic(), level.double()
     if cubic.gcd(cubic.derivative()).degree() > 0:
         raise LevelNotDone("The level is degenerate: the cubic (w + h)(w^2 + G) - C^2/2 has a double root.", REMEDY)
@@ -609,7 +608,7 @@ def _require_done(level: KovalevskayaLevel) -> None:
 
 
 def _require_apart(curve: Sequence[PhiRoot], ends: Sequence[Interval], name: str) -> None:
-    """Raises NotInClass where neither of the two forms evaluates the motion."""
+    """Raise NotInClass where neither of the two forms evaluates the motion."""
     limits = [number for pair in ends if pair[0] != pair[1] for number in pair]
     if sum(curve[number - 1].multiplicity > 1 for number in limits if number) > 1:
         raise LevelNotDone(f"{name}, and both separated variables tend to e.", REMEDY)

@@ -1,4 +1,4 @@
-"""Kovalevskaya's top by theta functions of two variables: a second closed form, which shares no series with the first.
+"""Kovalevskaya's top by theta functions of two variables: a second closed form, independent of the series of the first.
 
 The curve y² = −2 φ(w) with five distinct roots e_1, ..., e_5, sorted
 by real and imaginary part so that the broken line through them does not cross itself.  A_k = 2 ∫ (dw/y, w dw/y) from
@@ -63,7 +63,7 @@ from heavytop.top.equations import Parameters, heavy_top, kovalevskaya
 
 
 ORDERS = 5
-"""Length of the power series in t at the start that fixes phases and signs: zeros there have an order of up to 4."""
+"""Length of the power series in t at the start that determine phases and signs: zeros there have order 4 at most."""
 
 
 class KovalevskayaLevel(Reduced):
@@ -212,7 +212,7 @@ def linear(start: WorkingStart, values: Sequence[acb]) -> tuple[list[acb], list[
 
 
 def square_root(value: acb) -> acb:
-    """A root, whose ball is finite off 0, the negative axis included."""
+    """A square root whose ball is finite off 0, also on the negative axis."""
     return acb(0, 1) * (-value).sqrt() if value.real < 0 else value.sqrt()
 
 
@@ -237,7 +237,7 @@ def _plus(*characteristics: Characteristic) -> Characteristic:
 
 
 def _number(characteristic: Characteristic) -> int:
-    """Its place among FLINT's theta functions."""
+    """The index among FLINT's theta functions."""
     (a, b), (c, d) = characteristic
     return 8 * a + 4 * b + 2 * c + d
 
@@ -372,7 +372,7 @@ class ThetaMotion:
 
     @classmethod
     def of(cls, level: KovalevskayaLevel) -> ThetaMotion:
-        """At the working precision; raises Undecided where it does not suffice, or the roots are not distinct."""
+        """The motion at the working precision; raises Undecided where that does not suffice, or roots coincide."""
         start, branch_points = start_of(level), roots(level)
         if any(root.multiplicity > 1 for root in branch_points):
             raise Undecided
@@ -408,7 +408,7 @@ class ThetaMotion:
         return z - acb_mat([[2 * nearest_integer(z[i, 0].real / 2)] for i in (0, 1)])
 
     def _thetas(self, z: acb_mat) -> list[Any]:
-        """All 16 as series along v."""
+        """All 16 theta functions as series along v."""
         order = current_length() - 1
         jets, (first, second) = acb_mat.theta_jets(self.curve.tau, z, order), self.rate.entries()
         weights = [(n, first ** (n - i) * second**i) for n in range(order + 1) for i in range(n + 1)]
@@ -449,7 +449,7 @@ class ThetaMotion:
 
 
 def points(start: WorkingStart) -> list[tuple[arb, arb]]:
-    """(w_k, y_k) at t = 0, without w1 where it is infinite."""
+    """(w_k, y_k) at t = 0, omitting an infinite w1."""
     with series_length(ORDERS):
         square = 4 * start.motion[1] * start.motion[1]
         second = start.lower / start.upper

@@ -17,7 +17,7 @@ All of it rational, whatever s is.  The axis of symmetry in space, e3·(ξ + iη
     ℘'(V) = −i (C0³ − 2 C0 E I1 s² − C0 L² s² + 2 I1 L n s⁴)/(4 I1³ s³)
 
 and gives the attitude.  Sleeping tops, steady and regular precession, cusps, loops, passages through the poles, the
-spherical pendulum (L = 0) and the motions asymptotic to a sleeping top are starts like any other.
+spherical pendulum (L = 0) and the motions asymptotic to a sleeping top need no special case.
 
 *The axis of symmetry* need not be axis 3, nor its direction rational.  Let a be
 an exact vector along it, u and v = a × u exact vectors across it, A = |a|, and n = νa.  With x = a·γ in place of γ3 and
@@ -143,8 +143,8 @@ class Lagrange(ClosedForm):
         return Winding(value, -cubic / (4 * i1**3 * square**2), area / (2 * i1 * square), square)
 
     def xi_at(self, time: Fraction) -> list[arb]:
-        """Not known where the axis has come so near to a sleeping top (a motion asymptotic to it, at large times) that
-        the angle about it is lost at any sensible precision.
+        """ξ from ``initial_xi`` of γ; raises OutOfReach where the axis is so near to that of a sleeping top (on a
+        motion asymptotic to it, at large times) that the angle about it is lost.
         """
         gamma = self.start.gamma
         with series_length(2):
@@ -192,7 +192,7 @@ def _sides(h: acb, slope: acb, g: acb, w: acb, x: arb, size: arb) -> tuple[acb, 
 
 @dataclass(frozen=True, slots=True)
 class _Prepared:
-    """All that does not depend on the time.
+    """The constants of a motion.
 
     spin: a·Ω.  axis, across: |a| and |u|.  directions: u, v and a over |u|², |u|²|a| and |a|²; None for axes 1, 2, 3.
     """
@@ -253,7 +253,7 @@ def _axis(motion: Lagrange) -> Companions:
 
 # The spherical top, I1 = I2 = I3 with its centre of mass anywhere: Lagrange's top about r.
 #
-# Every axis of it is one of symmetry.  The direction of r is irrational in general, but the equalities that define the
+# Each of its axes is one of symmetry.  The direction of r is irrational in general, but the equalities that define the
 # class, the cubic of n·γ and both functions of the second kind are rational in the exact data:
 # the class is tested exactly, and any motion is known at any time.
 
@@ -333,7 +333,7 @@ def _top_of(case: LagrangeGyrostat) -> Lagrange:
     return Lagrange(plain, State((first, second, third + case._ahead), case.start.gamma))
 
 
-# A top with I1 = I2 and P c = 0, in sizes of about 1 and turned so that its moment of weight is (c, 0, 0).
+# A top with I1 = I2 and P c = 0, in units near 1 and rotated so that its moment of weight is (c, 0, 0).
 #
 # Divided by I3 the equations hold for n/I3, and for λ = k3/I3 of a rotor along axis 3.  With exact powers of two
 # Ω = rate Ω', γ = size γ', t = t'/rate they hold for n' = n size/(I3 rate²) and λ' = λ/rate; and a turn about axis 3,
@@ -353,7 +353,7 @@ class Reduced:
 
     @classmethod
     def of(cls, top: HeavyTop, start: State) -> Self:
-        """From a top with I1 = I2, P c = 0 and P r ≠ 0; a rotor lies along axis 3."""
+        """The data of a top with I1 = I2, P c = 0 and P r ≠ 0, and a rotor along axis 3 or none."""
         i3 = top.inertia[2]
         n1, n2 = (n / i3 for n in top.moment[:2])
         size = Fraction(2) ** exponent(max(map(abs, start.gamma)))
@@ -399,14 +399,14 @@ class Reduced:
         return vectors
 
     def in_body(self, vector: Sequence[Balls]) -> list[Balls]:
-        """A vector of the turned frame in the top's own axes."""
+        """A vector of the turned frame in the axes of the top."""
         c = ball(self.moment_square).sqrt()
         cosine, sine = (ball(n) / c for n in self.moment)
         x, y, z = vector
         return [cosine * x - sine * y, sine * x + cosine * y, z]
 
     def restored(self, motion: Sequence[Any]) -> list[Any]:
-        """Six series in t', or numbers, in the turned frame in the top's own units: :func:`in_units`."""
+        """Six series in t', or numbers, of the turned frame, in the axes and units of the top, as :func:`in_units`."""
         return in_units([*self.in_body(motion[:3]), *self.in_body(motion[3:])], self.rate, self.size)
 
 

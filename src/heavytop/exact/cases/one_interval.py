@@ -12,7 +12,7 @@ This satisfies the equations for Ω.  Those for γ are three identities between 
 
 x swings between two simple roots of QR, x = m + d cos θ (:mod:`heavytop.exact.separable.oscillation`), θ' = √g > 0 and
 t is one Abel integral of θ.  √Q and √R are products of √(2d) cos(θ/2), √(2d) sin(θ/2) and roots that never vanish:
-turning points are points like any other. The four motions of this form: Steklov's below,
+turning points need no special case.  The four motions of this form: Steklov's below,
 :mod:`heavytop.exact.cases.algebraic_starts`.
 """
 
@@ -119,14 +119,14 @@ class IntervalCurve:
 
 
 def value(polynomial: fmpq_poly, x: Fraction) -> Fraction:
-    """The polynomial at a rational place."""
+    """The value of the polynomial at a rational number."""
     ball_of_value = polynomial(rational(x))
     return Fraction(int(ball_of_value.p), int(ball_of_value.q))
 
 
 @dataclass(frozen=True, slots=True)
 class _End:
-    """A root of QR: its place, and whether it is one of Q (0) or of R (1)."""
+    """A root of QR.  of: 0 for a root of Q, 1 for one of R."""
 
     place: acb
     of: int
@@ -136,8 +136,8 @@ class _End:
 class OneGapMotion:
     """A motion on a curve at one working precision.
 
-    rests: what is left of Q and of R without the ends of the gap.  stops: the lower end and the upper end.  others: the
-    other roots of QR.  origin: Abel's integral at t = 0.  signs: of √Q and √R with their half angles.
+    rests: Q and R without the ends of the gap.  stops: the lower end and the upper end.  others: the other roots of QR.
+     origin: Abel's integral at t = 0.  signs: of √Q and √R with their half angles.
     """
 
     curve: IntervalCurve
@@ -151,9 +151,9 @@ class OneGapMotion:
 
     @classmethod
     def of(cls, curve: IntervalCurve, x: Fraction, signs: tuple[int, int], most: int = MOST_TERMS) -> OneGapMotion:
-        """From x and the signs of √Q and √R there, 0 where they vanish; at the working precision.
+        """The motion at the working precision from x and the signs of √Q and √R there, 0 where they vanish.
 
-        Raises Undecided where it does not suffice, OutOfReach where the Fourier series needs more than ``most`` terms.
+        Raises Undecided where that does not suffice, OutOfReach for a Fourier series of more than ``most`` terms.
         """
         roots, leads = _roots(curve), [_lead(part) for part in (curve.second, curve.third)]
         low, high = _gap_ends(roots, leads[0] * leads[1], ball(x))
@@ -187,7 +187,7 @@ class OneGapMotion:
 
     @cached_per_precision
     def azimuth(self) -> Azimuth:
-        """That of the level part of M about γ; see :meth:`Curve.turning`."""
+        """The azimuth of the level part of M about γ, by :meth:`IntervalCurve.turning`."""
         numerator, denominator = self.curve.turning()
         poles: Any = denominator.complex_roots()
         doubled = [(acb(root), 2 * many) for root, many in poles]
@@ -232,7 +232,7 @@ def horner(polynomial: fmpq_poly, x: Balls) -> Balls:
 
 @whole_evaluation
 def gaps(curve: IntervalCurve) -> list[tuple[float, float]]:
-    """Where Q and R are both positive between two of their roots."""
+    """The intervals between two roots on which Q and R are both positive."""
     with working_precision(_SEARCH_BITS):
         real = sorted(float(root.place.real) for root in _roots(curve) if root.place.imag.is_zero())
         return [ends for ends in pairwise(real) if min(curve.squares(Fraction(sum(ends) / 2))) > 0]
@@ -248,7 +248,7 @@ def _roots(curve: IntervalCurve) -> list[_End]:
 
 
 def _gap_ends(roots: Sequence[_End], lead: arb, x: arb) -> tuple[_End, _End]:
-    """Between which two real roots of QR the place x lies; raises Undecided where the balls do not tell."""
+    """The two real roots of QR around x; raises Undecided where the balls do not determine them."""
     between = alternate(
         ordered([root.place for root in roots]), [1] * len(roots), bool(lead > 0) == (len(roots) % 2 == 0)
     )
@@ -273,7 +273,7 @@ def _gap_ends(roots: Sequence[_End], lead: arb, x: arb) -> tuple[_End, _End]:
 
 _LEAST = 256
 _TERMS_A_BIT = 64
-"""How long the Fourier series may be at a working precision: 2^14 terms at 256 bits."""
+"""The most terms of the Fourier series per bit of the working precision: 2^14 terms at 256 bits."""
 
 
 def _moments(top: HeavyTop, _start: State) -> Sequence[Fraction]:

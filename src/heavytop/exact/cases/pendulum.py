@@ -70,12 +70,12 @@ class Pendulum(WithAttitude):
 
     @property
     def axis(self) -> Vector:
-        """A vector along the axis it turns about, its largest component ± 1; 0 where it is in equilibrium."""
+        """A vector along the axis of rotation, its largest component ± 1; 0 in equilibrium."""
         return _axis(self.top, self.start)
 
     @property
     def steady(self) -> bool:
-        """It stands still: at rest where no torque acts."""
+        """Whether it is in equilibrium."""
         return not any(self.axis)
 
     def motion(self, time: BallLike) -> tuple[list[BallLike], Carry]:
@@ -104,7 +104,7 @@ class Swing:
         return self.amplitude * sn, cosine, self.speed * speed
 
     def half(self, time: arb) -> arb:
-        """x/2, continuous for all times: it grows by π with every turn of a rotation."""
+        """x/2, continuous for all times; it grows by π per turn of a rotation."""
         sine, cosine, _ = self.at(time)
         quarter = self.functions.quarter
         if not self.rotating or quarter is None:
@@ -145,7 +145,7 @@ def swing(
 
 @dataclass(frozen=True, slots=True)
 class _Lattice:
-    """All that does not depend on the time.  axis: e.  half: (cos, sin) of x(0)/2."""
+    """The constants of a motion.  axis: e.  half: (cos, sin) of x(0)/2."""
 
     axis: list[arb]
     swing: Swing
@@ -160,7 +160,7 @@ class _Lattice:
 
 @cached_per_precision
 def _lattice(case: Pendulum) -> _Lattice | None:
-    """None where it stands still."""
+    """The constants of the motion; None in equilibrium."""
     if case.steady:
         return None
     n, gamma, axis = case.top.moment, case.start.gamma, case.axis

@@ -1,6 +1,6 @@
-"""Staude's permanent rotations: Ω ∥ γ, both constant in the body; and every other start that stays what it is.
+"""Staude's permanent rotations: Ω ∥ γ, both constant in the body; and every other equilibrium of the equations.
 
-γ' = 0 asks Ω = ω γ, and M' = 0 then asks γ × (P r − ω² I γ) = 0.  So γ lies on Staude's cone, r·(I γ × γ) = 0, and
+γ' = 0 means Ω = ω γ, and M' = 0 then means γ × (P r − ω² I γ) = 0.  So γ lies on Staude's cone, r·(I γ × γ) = 0, and
 
     ω² = P (I γ × γ)·(r × γ) / |I γ × γ|²     where γ is not a principal axis; it must not be negative.
 

@@ -18,7 +18,7 @@ difference of both rulings, which are the two points of y² = f(λ) at λ = ∞:
     ℘(V) = (a1² − a0a2)/a0,   ℘'(V) = i G (a0²a3 − 3a0a1a2 + 2a1³)/a0²,   κ = G a1/a0
     Zj D = e^(iκt) (c0 Φ + c1 Φ' + c2 Φ'' + c3 Φ''' + c4 Φ''''),   Φ as in :mod:`heavytop.exact.elliptic.weierstrass`
 
-with c from the principal part of e^(−iκt) Zj D.  Nothing is divided by what depends on the time but D.
+with c from the principal part of e^(−iκt) Zj D.  D is the only divisor that depends on the time.
 Sources: N. E. Zhukovsky (1885), V. Volterra, Acta Math. 22 (1899) 201; the formulas are derived here, and proven by
 their residuals.
 """
@@ -63,7 +63,7 @@ from heavytop.top.bodies import IDENTITY
 from heavytop.top.equations import HEAVY_GYROSTAT
 
 _POLE, _LAST = 5, 5
-"""D and D Mi have a pole of that order at t = 0, and are compared up to that power of t."""
+"""Order of the pole of D and D Mi at t = 0, and the power of t up to which they are compared."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +179,7 @@ def _terms(point: Point, order: int) -> list[BallLike]:
 
 
 def _combined(rows: arb_mat, terms: Sequence[Any]) -> list[BallLike]:
-    """The combinations of the terms with the factors in each row: of numbers, or of real series."""
+    """The linear combinations of the terms, numbers or real series, with the factors of each row."""
     if isinstance(terms[0], arb):
         return list((rows * arb_mat(len(terms), 1, list(terms))).entries())
     table: Any = rows.table()
@@ -244,7 +244,7 @@ def _parameters(case: ZhukovskyVolterra) -> Any:
 
 @once
 def _exact(case: ZhukovskyVolterra) -> _Exact:
-    """By linear equations."""
+    """The exact data of the curve, by linear equations."""
     basis, momentum = _basis(*case.invariants()), _momentum_series(case)
     size = len(basis[0])
     equations = []
@@ -309,7 +309,7 @@ class _Fixed:
     order: int
 
     def at(self, momentum: list[Balls], point: Point, inverse: Balls) -> list[Balls]:
-        """In body components at the point."""
+        """Its body components at the point."""
         along = [m * self.share for m in momentum]
         if self.wave is None or self.factors is None:
             return along

@@ -14,11 +14,11 @@ carry the errors of the motion, {Q x: |x_i| ≤ r_i}: with Q'^-1 Φ Q within η 
 
 so a column of errors is carried by Lohner's method as one more set of errors of the motion.
 
-Φ and σ take fewer bits than the motion: what they lack at t_n is multiplied by ∂y(t)/∂y(t_n) and J(t_n), seldom by much
-more than J(t), to which digits are relative, while W, which Φ lacks too, has grown by ∂y(t_n)/∂y(0) before.  They are
+Φ and σ need fewer bits than the motion: their errors at t_n are multiplied by ∂y(t)/∂y(t_n) and J(t_n), seldom by much
+more than J(t), to which digits are relative, while W, also an error of Φ, has grown by ∂y(t_n)/∂y(0) before.  They are
 computed beside each step of the motion, along a polynomial in their own bits
-(:func:`heavytop.exact.enclosure.step.in_other_bits`).  Both precisions are chosen so that the digits come out, and
-raised by what was lacking, up to six times.
+(:func:`heavytop.exact.enclosure.step.in_other_bits`).  Both precisions are chosen so as to leave the
+requested digits, and raised by the missing bits, up to six times.
 
 One or two columns of S follow from the others.  A body of c times the mass moves as before, unless it has a rotor of
 given momentum; and γ and n enter by their products, so that from (Ω0, c γ0) with n/c the motion is (Ω, c γ):
@@ -75,7 +75,7 @@ from heavytop.multiword.integers.integer_series import QuadraticComponent, coeff
 from heavytop.precision import decimal_text
 from heavytop.top.equations import Parameters, System
 
-# One proven step of the derivatives: what the state at its end is to the state, and to the data, it began with.
+# One proven step of the derivatives of the state at its end with respect to the state at its beginning and to the data.
 #
 # A step of :mod:`heavytop.exact.enclosure.step` goes over 0 ≤ τ ≤ 1 with y' = h f(y), f = Q(y, y) + L y.  Φ is its
 # fundamental matrix and σ the derivative with respect to a datum θ that enters f, along the motion itself,
@@ -83,10 +83,10 @@ from heavytop.top.equations import Parameters, System
 #     Φ' = h Df(y) Φ, Φ(0) = 1,     σ' = h Df(y) σ + h G(y), σ(0) = 0,     G = ∂f/∂θ, again of degree two.
 #
 # Their columns are computed along the polynomial p = Σ b_n τⁿ of the step, as polynomials v = Σ v_n τⁿ of its order N
-# or, where that leaves too much, of a larger one: in words
+# or, where the remainder is too large, of a larger one: in words
 # (:mod:`heavytop.multiword.fixed_point.first_variation`) or in exact integers, where the columns and the motion are one
-# field of degree two.  What v lacks is its defect E = v' − h Df(p) v − h G(p).  Below N it is what rounding left, ρ_n;
-# from N on it is known.  With β_n = |b_n|, ν_n = |v_n| and |G(y)| ≤ q_G |y|² + l_G |y|, the integral of |E| is at most
+# field of degree two.  The defect of v is E = v' − h Df(p) v − h G(p).  Below N it is the rounding error ρ_n; from N on
+# it is known.  With β_n = |b_n|, ν_n = |v_n| and |G(y)| ≤ q_G |y|² + l_G |y|, the integral of |E| is at most
 #
 #     Δ = Σ_{n < N} ρ_n + Σ_{n ≥ N} h (2q Σ_{j+k=n} β_j ν_k + l ν_n + q_G Σ_{j+k=n} β_j β_k + l_G β_n)/(n + 1).      (a)
 #
@@ -106,7 +106,7 @@ _LARGEST_GROWTH = 16.0
 
 @dataclass(frozen=True, slots=True)
 class Datum:
-    """A datum θ of the field.  field: G, for a unit of θ in which it is of ordinary size; unit: that, as given."""
+    """A datum θ of the field.  field: G, for a unit of θ in which it is near 1; unit: that unit in the input units."""
 
     field: Quadratic
     unit: Fraction
@@ -226,7 +226,7 @@ def step_derivatives(tangent: Tangent, step: Step, tau: Fraction) -> StepDerivat
 
 
 def _columns(tangent: Tangent, step: Step, values: bool) -> Columns | None:
-    """The columns beside a step, with all their coefficients where these are asked for."""
+    """The columns of a step; values: with all their coefficients."""
     if isinstance(step.series, WordSeries):
         words = tangent.columns
         return None if words is None else words.columns(step.node.centre, step.node.halvings, values)
@@ -243,7 +243,7 @@ def _columns(tangent: Tangent, step: Step, values: bool) -> Columns | None:
 
 
 def _along(step: Step, columns: Columns) -> tuple[StepSeries, float]:
-    """The polynomial that columns were computed along, and how far it is from that of the step, in ulps."""
+    """The polynomial along which columns were computed, and its distance from that of the step, in ulps."""
     return (columns.motion, columns.beyond) if isinstance(columns, _WholeColumns) else (step.series, 0.0)
 
 
@@ -296,16 +296,16 @@ def _defect(
 
 
 def _ldexp(value: float, exponent: int) -> float:
-    """value 2^exponent, upwards where that is too small, and infinite where it is too large."""
+    """value 2^exponent, rounded up where that is too small, and infinite where it is too large."""
     if exponent > 1000:
         return inf
     return float(np.ldexp(value, max(-1000, exponent))) + 2.0**-1000
 
 
-# The derivatives of a vector field with respect to the data that enter it, from the field itself.
+# The derivatives of a vector field with respect to its data, computed from the field.
 #
 # A field of :mod:`heavytop.top.equations` is evaluated over power series a + b ε + ...: the coefficient of ε is its
-# derivative, exactly.  No derivative is written down a second time.
+# exact derivative.
 
 
 DATA = ("I1", "I2", "I3", "n1", "n2", "n3")
@@ -334,15 +334,15 @@ def slope(system: System, p: Parameters, datum: int, unit: Fraction) -> Callable
 METHOD = "validated: variational equation on the Taylor enclosure"
 _UP = 1 + 2.0**-32
 Centre: TypeAlias = tuple[list[list[mpz]], Matrix, int, tuple[Step, Fraction, Matrix]]
-"""(J, S) in ulps, bounds of its errors in ulps 2^exponent, the exponent; the step, the place in it, its radii there."""
+"""(J, S) in ulps, bounds of its errors in ulps 2^exponent, the exponent; the step, τ, and its radii there."""
 _UNIT = 2.0**-53
 _ATTEMPTS = 6
 _GUARD = 18
-"""Bits beyond those asked for: what bounds lose, and what a motion loses that loses little."""
+"""Bits beyond the requested ones, for the losses of bounds and of short motions."""
 _OF_COLUMNS, _MOST_OF_COLUMNS = 13, 60
 """Bits that Φ and σ lose where the motion loses few; and the loss of a motion beyond which they lose no more."""
 _OF_DATA = 8
-"""Bits that S has fewer than J: a second run costs more than they do."""
+"""Spare bits for S, which has fewer than J: they cost less than a second run."""
 _OF_LAWS = 4
 """Bits that a column of S may lose where it follows from the others."""
 _FEW = 4
@@ -356,7 +356,7 @@ Balls = list[list[arb]]
 
 @dataclass(frozen=True, slots=True)
 class EnclosedDerivatives:
-    """start: J, 6 × 6, [i][j] = ∂y_i(t)/∂y_j(0).  data: S, 6 × 6, by :data:`DATA`; None where not asked for."""
+    """Derivatives of a state.  start: J, 6 × 6, [i][j] = ∂y_i(t)/∂y_j(0).  data: S, 6 × 6, by :data:`DATA`, or None."""
 
     start: Balls
     data: Balls | None
@@ -380,7 +380,7 @@ class _Columns:
 
 
 def derivatives(known: Validated, times: Sequence[Fraction], bits: int, data: bool) -> list[EnclosedDerivatives]:
-    """J, and S where asked for, at each of ``times`` in their order: ``bits`` right, relative above 1, absolute below.
+    """J, and S with ``data``, at each of ``times``, to ``bits`` bits: relative above 1, absolute below.
 
     Raises OutOfReach where the digits cannot be proven, or would take longer than ``known.effort``.
     """
@@ -404,7 +404,7 @@ def _at_rest(bits: int, data: bool) -> EnclosedDerivatives:
 def _one_way(
     known: Validated, direction: int, spans: list[Fraction], bits: int, data: bool
 ) -> dict[Fraction, EnclosedDerivatives]:
-    """The derivatives at ``spans`` > 0 from time 0 on, in increasing order, in one direction."""
+    """The derivatives at ``spans`` > 0, in increasing order, in one direction."""
     motion = known.motion(direction)
     time = direction * spans[-1]
     loss, steps = known.forecast(time, bits)
@@ -491,7 +491,7 @@ def _datum(known: Validated, motion: ScaledMotion, datum: int) -> tuple[Datum, C
 
 
 def _require_right(tangent: Tangent, motion: ScaledMotion) -> None:
-    """The first columns that machine code computes in this process are compared with exact integers."""
+    """Compare the first columns of machine code in this process with exact integers."""
     certified, columns = tangent.certified, tangent.columns
     if certified is None or columns is None:
         return
@@ -521,7 +521,7 @@ def _require_right(tangent: Tangent, motion: ScaledMotion) -> None:
 
 
 def _run(tangent: Tangent, run: EnclosureRun, spans: list[Fraction]) -> Iterator[tuple[Fraction, Centre | None]]:
-    """(span, centre and radii there) for each; None in place of them, and an end, where the errors are too large."""
+    """(span, centre and radii) for each span; it ends with (span, None) where the errors are too large."""
     node, size, rate = run.nodes[0], tangent.field.dimension, run.motion.scaled.rate
     unit = [[mpz((i == j) << tangent.precision) for j in range(tangent.width)] for i in range(size)]
     columns = _Columns(unit, np.zeros((size, tangent.width)), 0)
@@ -546,7 +546,7 @@ def _run(tangent: Tangent, run: EnclosureRun, spans: list[Fraction]) -> Iterator
 
 
 def _step(tangent: Tangent, run: EnclosureRun, node: Node) -> tuple[Step, Step, StepDerivatives] | None:
-    """A step, the same in their bits, and its derivatives; shorter where they need it, in integers if words fail."""
+    """A step, the same step in the bits of the derivatives, and these; in integers or shorter where words fail."""
     for certified in (tangent.certified, None) if tangent.certified else (None,):
         for shorter in range(_SHORTENED):
             motion_step = run.step(replace(node, halvings=node.halvings + shorter))
@@ -560,7 +560,7 @@ def _step(tangent: Tangent, run: EnclosureRun, node: Node) -> tuple[Step, Step, 
 
 
 def _product(tangent: Tangent, own: StepDerivatives, rows: list[list[mpz]]) -> list[list[mpz]]:
-    """Φ (J, S) + (0, σ), each entry within half an ulp of that of the centres."""
+    """Φ (J, S) + (0, σ) of the centres, each entry within half an ulp."""
     size, width, bits = len(rows), tangent.width, tangent.precision
     phi = fmpz_mat(size, size, [int(value) for row in own.rows for value in row[:size]])
     product = (phi * fmpz_mat(size, width, [int(value) for row in rows for value in row])).entries()
@@ -572,7 +572,7 @@ def _product(tangent: Tangent, own: StepDerivatives, rows: list[list[mpz]]) -> l
 
 
 def _local(tangent: Tangent, own: StepDerivatives, columns: _Columns) -> Matrix:
-    """Bounds of the errors that a step itself makes in each column, in ulps 2^exponent."""
+    """Bounds of the errors that a step adds to each column, in ulps 2^exponent."""
     size = len(columns.rows)
     of_phi = max(own.errors[:size])
     sizes = of_phi * columns.sizes(tangent.precision) + 1.0
@@ -612,7 +612,7 @@ def _at(tangent: Tangent, taken: Step, own: StepDerivatives, columns: _Columns, 
 
 @whole_evaluation
 def _in_units(known: Validated, motion: ScaledMotion, tangent: Tangent, values: Centre) -> EnclosedDerivatives:
-    """As balls, in the units given."""
+    """The derivatives as balls, in the input units."""
     rows, radii, exponent, (taken, tau, around) = values
     sizes = motion.scaled.sizes
     scales = [*sizes, *(datum.unit for datum in tangent.data)]
