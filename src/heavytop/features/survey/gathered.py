@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 import numpy
@@ -22,7 +22,7 @@ from heavytop.harness.rows import Task, data_of
 from heavytop.harness.sweeps import Sweep
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.scalar import of_fraction
-from heavytop.records import CellMap, Histogram, Metric, Quantity, Row, Spread, Worst, by_name
+from heavytop.records import CellMap, Histogram, Metric, Quantity, Row, RowKey, Spread, Worst, by_name
 
 # The file of a survey: one Parquet row group a chunk, one row a motion.
 
@@ -160,87 +160,80 @@ _QUANTITIES = {
     "error_scaled": (_ERROR, "scaled"),
     **{name: ("drift", name.removeprefix("drift_")) for name in DRIFT_COLUMNS},
 }
+_OF_MOTIONS = ("index", "outcome", "steps", "digits_right", *_QUANTITIES)
+"""Columns from which the row of a survey is made."""
 _NORMAL = 1.959964
 """Standard deviations of a 95 % interval."""
 
 
-class _Bad(NamedTuple):
-    """A motion, the worst the smallest: failed runs first, then the largest errors, then the first drawn."""
+def gathered(rows: Iterator[tuple[Task, Row]]) -> list[Row]:
+    """A row for each sweep and integrator, in the order of the plan.
 
-    reached: bool
-    minus_error: float
-    motion: int
-    digits: float
-    outcome: str
-
-
-class Gathered:
-    """Takes in the chunks of one survey, in order; keeps eight doubles a motion."""
-
-    def __init__(self, first: Row, task: Task) -> None:
-        self._row, self._task = first, task
-        self._values: dict[str, list[Any]] = {name: [] for name in _QUANTITIES}
-        self._outcomes: Counter[str] = Counter()
-        self._digits: list[Any] = []
-        self._steps = 0
-        self._worst: list[_Bad] = []
-        self._map: dict[str, list[Any]] = {name: [] for name in task.options}
-
-    def take(self, row: Row) -> None:
-        """Add a chunk."""
-        assert isinstance(row.chunk, bytes)
+    A survey with a chunk that was not measured ends as the first such chunk does, and keeps the statistics of the
+    others.  A dozen numbers a motion are held in memory.
+    """
+    tables: dict[RowKey, list[Any]] = {}
+    first: dict[RowKey, tuple[Task, Row, tuple[str, ...]]] = {}
+    lost: dict[RowKey, Row] = {}
+    for task, row in rows:
+        key = msgspec.structs.replace(row.key, case=sweep_of(task).name)
+        chunks = tables.setdefault(key, [])
+        of_survey = msgspec.structs.replace(row, case=key.case, key=key, request=_request(task), chunk=msgspec.UNSET)
+        if not isinstance(row.chunk, bytes):
+            lost.setdefault(key, of_survey)
+            continue
         table = read_chunk(row.chunk)
-        for name, values in self._values.items():
-            values.append(table[name].drop_null().to_numpy())
-        if not self._outcomes and not self._map:
-            self._map = {name: [] for name in two_of({name: table[name].to_numpy() for name in DATA})}
-        for name, values in [*self._map.items(), ("", self._digits)]:
-            values.append(table[name or "digits_right"].to_numpy())
-        outcomes = table["outcome"].cast("string").to_pylist()
-        self._outcomes.update(outcomes)
-        self._steps += int(sum(table["steps"].to_pylist()))
-        error = table["error_max"].to_numpy()
-        error = numpy.where(numpy.isnan(error), 0.0, error)
-        success = numpy.array([outcome == Outcome.SUCCESS.value for outcome in outcomes])
-        places = numpy.lexsort((-error, success))[:MOST_WORST].tolist()
-        index, digits = table["index"].to_numpy(), table["digits_right"].to_numpy()
-        worst = [_Bad(bool(success[i]), -error[i], int(index[i]), float(digits[i]), outcomes[i]) for i in places]
-        self._worst = sorted([*self._worst, *worst])[:MOST_WORST]
+        if key not in first:
+            axes = task.options or two_of({name: table[name].to_numpy() for name in DATA})
+            first[key] = task, of_survey, axes
+        chunks.append(table.select(dict.fromkeys((*_OF_MOTIONS, *first[key][2]))))
+    ended = ("outcome", "time_reached", "finite", "reference", "against")
+    surveys = []
+    for key, chunks in tables.items():
+        row = _survey(*first[key], chunks) if chunks else lost[key]
+        changes = {name: getattr(lost[key], name) for name in ended} if key in lost else {}
+        surveys.append(msgspec.structs.replace(row, **changes))
+    return surveys
 
-    def row(self) -> Row:
-        """The row of the report."""
-        sweep = sweep_of(self._task)
-        name, cases = sweep.name, sweep.cases()
-        motions = self._outcomes.total()
-        failed = motions - self._outcomes[Outcome.SUCCESS.value]
-        counts = {Quantity(COUNT, outcome): n for outcome, n in sorted(self._outcomes.items())}
-        metrics = {q: Metric(str(n), math.log10(n), "value") for q, n in counts.items()}
-        sorted_values = {column: numpy.sort(numpy.concatenate(values)) for column, values in self._values.items()}
-        for column, values in sorted_values.items():
-            metrics |= _quantiles(Quantity(*_QUANTITIES[column]), values)
-        histograms = {name: bins for name, values in sorted_values.items() if (bins := histogram(values))}
-        return msgspec.structs.replace(
-            self._row,
-            case=name,
-            key=msgspec.structs.replace(self._row.key, case=name),
-            chunk=msgspec.UNSET,
-            outcome=Outcome.SUCCESS.value,
-            metrics=by_name(metrics),
-            steps=self._steps,
-            measured=f"{motions} motions of the sweep {name}, {failed} of which did not reach the horizon",
-            data=None,
-            request=_request(self._task),
-            spread=Spread(histograms, self._cells()),
-            worst=tuple(_worst(self._task, cases[motion.motion], motion) for motion in self._worst),
-        )
 
-    def _cells(self) -> CellMap | None:
-        """The digits lost over two of the data."""
-        if len(self._map) < 2:
-            return None
-        lost = self._row.bits * math.log10(2) - numpy.concatenate(self._digits)
-        x, y = ((name, numpy.concatenate(values)) for name, values in self._map.items())
-        return cell_map(x, y, lost)
+def _survey(task: Task, row: Row, axes: Sequence[str], chunks: Sequence[Any]) -> Row:
+    """The row of the motions in these tables.  row: of the first chunk.  axes: data over which digits are mapped."""
+    import pyarrow
+
+    table = pyarrow.concat_tables(chunks)
+    outcomes, cases = table["outcome"].cast("string").to_pylist(), sweep_of(task).cases()
+    counts = Counter(outcomes)
+    metrics = {
+        Quantity(COUNT, outcome): Metric(str(n), math.log10(n), "value") for outcome, n in sorted(counts.items())
+    }
+    sorted_values = {column: numpy.sort(table[column].drop_null().to_numpy()) for column in _QUANTITIES}
+    for column, values in sorted_values.items():
+        metrics |= _quantiles(Quantity(*_QUANTITIES[column]), values)
+    digits, error, index = (table[name].to_numpy() for name in ("digits_right", "error_max", "index"))
+    error = numpy.where(numpy.isnan(error), 0.0, error)
+    success = numpy.array([outcome == Outcome.SUCCESS.value for outcome in outcomes])
+    # failed runs first, then the largest errors, then the first drawn
+    order = numpy.lexsort((index, -error, success))[:MOST_WORST].tolist()
+    cells = None
+    if len(axes) == 2:
+        x, y = ((name, table[name].to_numpy()) for name in axes)
+        cells = cell_map(x, y, row.bits * math.log10(2) - digits)
+    return msgspec.structs.replace(
+        row,
+        outcome=Outcome.SUCCESS.value,
+        metrics=by_name(metrics),
+        steps=int(table["steps"].to_numpy().sum()),
+        measured=f"{len(outcomes)} motions of the sweep {row.case}, {len(outcomes) - success.sum()} of which did not "
+        "reach the horizon",
+        data=None,
+        spread=Spread(
+            {name: bins for name, values in sorted_values.items() if (bins := histogram(values))},
+            cells,
+        ),
+        worst=tuple(
+            _worst(task, cases[index[i]], int(index[i]), outcomes[i], float(error[i]), float(digits[i])) for i in order
+        ),
+    )
 
 
 def _quantiles(quantity: Quantity, values: NDArray[numpy.float64]) -> dict[Quantity, Metric]:
@@ -259,33 +252,12 @@ def _quantiles(quantity: Quantity, values: NDArray[numpy.float64]) -> dict[Quant
     return quantiles
 
 
-def _worst(task: Task, case: Case, bad: _Bad) -> Worst:
-    data = data_of(case)
+def _worst(task: Task, case: Case, index: int, outcome: str, error: float, digits: float) -> Worst:
+    data, subject, reached = data_of(case), task.key.subject, outcome == Outcome.SUCCESS.value
     assert data is not None
-    right = None if math.isnan(bad.digits) else round(bad.digits, 2)
-    error = f"{-bad.minus_error:.8g}" if bad.reached else ""
-    subject = task.key.subject
-    command = rerun(case, task.times, task.key.precision, subject.name, subject.tolerance, bad.reached)
-    return Worst(case.name, bad.motion, bad.outcome, error, right, data, command)
-
-
-def gathered(rows: Iterator[tuple[Task, Row]]) -> list[Row]:
-    """A row for each sweep and integrator, in the order of the plan.
-
-    A survey with a chunk that was not measured ends as the first such chunk does: what the others came to stays in it.
-    """
-    sums: dict[Any, Gathered | None] = {}
-    lost: dict[Any, Row] = {}
-    for task, row in rows:
-        key = msgspec.structs.replace(row.key, case=sweep_of(task).name)
-        entry = sums.setdefault(key, None)
-        if not isinstance(row.chunk, bytes):
-            lost.setdefault(key, msgspec.structs.replace(row, case=key.case, key=key, request=_request(task)))
-            continue
-        if entry is None:
-            entry = sums[key] = Gathered(row, task)
-        entry.take(row)
-    return [_survey(entry, lost.get(key)) for key, entry in sums.items()]
+    command = rerun(case, task.times, task.key.precision, subject.name, subject.tolerance, reached)
+    right = None if math.isnan(digits) else round(digits, 2)
+    return Worst(case.name, index, outcome, f"{error:.8g}" if reached else "", right, data, command)
 
 
 def _request(task: Task) -> dict[str, str]:
@@ -297,18 +269,6 @@ def sweep_of(task: Task) -> Sweep:
     """The sweep that the motions of a task are of."""
     assert isinstance(task.case, Chunk)
     return task.case.sweep
-
-
-def _survey(measured: Gathered | None, lost: Row | None) -> Row:
-    """The row of a survey: what its measured chunks came to, with the outcome of a lost one."""
-    if measured is None:
-        assert lost is not None
-        return lost
-    row = measured.row()
-    if lost is None:
-        return row
-    ended = {name: getattr(lost, name) for name in ("outcome", "time_reached", "finite", "reference", "against")}
-    return msgspec.structs.replace(row, **ended)
 
 
 def of_motions(row: Row) -> Sequence[tuple[str, str]]:
