@@ -70,112 +70,112 @@ def unknown(key: str, known: Sequence[str]) -> InputError:
     return InputError(f"Unknown key {quoted(key)}.", meant(key, known, _LIKE).rstrip() or REMEDY)
 
 
-class TextTable:
-    """A text table: the keys of its comments, its rows in the order t Ω1 Ω2 Ω3 γ1 γ2 γ3, and what was noticed.
+def read_table(text: str, started: bool = False) -> tuple[dict[str, Any], list[str]]:
+    """The comments and columns of a text table, as the JSON document would hold them, and notes.
 
-    known: the keys that a comment may have.  started: the attitude at t = 0 is known without them.
+    started: the attitude at t = 0 is known without them.
     Raises InputError for a header or a row that cannot be understood, for a misspelt key and one that stands twice.
     """
+    if "\0" in text:
+        raise InputError("A table must be text; this holds a byte 0.", REMEDY)
+    if text.count("\n") > 2 * MOST_STATES:
+        raise too_many(text.count("\n"))
+    keys, comments, lines, body = _lines(text)
+    if not body:
+        raise _no_header([])
+    separator = _separator(body[0])
+    first = _cells(body[0], separator)
+    header = next((names for names in reversed(comments) if _is_header(names, len(first))), None)
+    if not _is_number(first[0]):
+        header, body, lines = first, body[1:], lines[1:]
+    names, notes = _without_header(first) if header is None else (header, [])
+    if not body:
+        raise InputError("The table has no row below its header.", "Give a row for each time.")
+    cells = _split(body, lines, separator, len(names))
+    names, cells, noted = logs.with_one_time(names, cells, started or not keys.keys().isdisjoint(_STARTS))
+    notes += noted
+    if keys.get("attitude") == "rotation vector":
+        names = [re.sub(r"^r_?([xyz])$", r"rotvec\1", name.strip()) for name in names]
+    meaning = observed_columns.header(names, str(keys.get("joint", "")))
+    logs.require_understood(names, meaning.others, [*meaning.places])
+    cut, times = "", [] if meaning.time is None else [logs.number(row[meaning.time]) for row in cells]
+    if times and None not in times:
+        kept, noted, cut = logs.without_repeats([time for time in times if time is not None], cells, lines)
+        cells, lines = [cells[i] for i in kept], [lines[i] for i in kept]
+        notes += noted
+    units = {"omega" if name == "framed" else name: unit.name for name, unit in meaning.units.items()}
+    in_units = [f"{name} in {unit}" for name, unit in units.items() if name != "position"]
+    notes += [f"as the header says, {', '.join(in_units)}"] if in_units else []
+    columns: dict[str, Any]
+    if meaning.time is not None and (meaning.units or observed_columns.is_more_than_states(meaning)):
+        unused = [*meaning.others, *(names[place] for place in _parts(meaning))]
+        times_written = [row[meaning.time] for row in cells]
+        columns = {"times": times_written, "header": meaning, "cells": cells, "lines": lines}
+    else:
+        places = meaning.of_state()
+        if missing := [name for name in COLUMNS if name not in places]:
+            raise _no_header(missing, names)
+        unused = [name for index, name in enumerate(names) if index not in places.values()]
+        states = [[row[places[name]] for name in VARIABLES] for row in cells]
+        columns = {"times": [row[places["t"]] for row in cells], "states": states}
+        columns["numbers"] = [f"Line {number}" for number in lines]
+    return keys | columns | {"cut": cut}, notes + unread(unused, names)
 
-    def __init__(self, text: str, known: Sequence[str], started: bool = False) -> None:
-        self.keys: dict[str, str | list[str]] = {}
-        self.rows: list[list[str]] = []
-        self.notes: list[str] = []
-        self.cut = ""
-        self.header: observed_columns.Header | None = None
-        comments: list[list[str]] = []
-        body: list[str] = []
-        self.lines: list[int] = []
-        for number, line in enumerate(text.splitlines(), 1):
-            stripped = line.strip()
-            if stripped.startswith(_COMMENT):
-                comment = stripped.lstrip("#%!/ ")
-                if not body and not self._key(comment, known):
-                    comments.append(_cells(comment, None))
-                    if stripped.startswith("%time"):  # of rostopic, in nanoseconds
-                        comments[-1][0] = "%time"
-            elif stripped:
-                body.append(stripped)
-                self.lines.append(number)
-        if not body:
-            raise _no_header([])
-        separator = _separator(body[0])
-        first = _cells(body[0], separator)
-        header = next((names for names in reversed(comments) if _is_header(names, len(first))), None)
-        if not _is_number(first[0]):
-            header, body, self.lines = first, body[1:], self.lines[1:]
-        names = self._without_header(first) if header is None else header
-        if not body:
-            raise InputError("The table has no row below its header.", "Give a row for each time.")
-        self.cells = _split(body, self.lines, separator, len(names))
-        names, self.cells, notes = logs.with_one_time(
-            names, self.cells, started or not self.keys.keys().isdisjoint(_STARTS)
+
+def _lines(text: str) -> tuple[dict[str, str | list[str]], list[list[str]], list[int], list[str]]:
+    """The keys of the comments, the words of those above the table that are no keys, and the rows with their lines."""
+    keys: dict[str, str | list[str]] = {}
+    comments: list[list[str]] = []
+    lines: list[int] = []
+    body: list[str] = []
+    for number, line in enumerate(text.splitlines(), 1):
+        stripped = line.strip()
+        if stripped.startswith(_COMMENT):
+            comment = stripped.lstrip("#%!/ ")
+            if not body and not _take_key(comment, keys):
+                comments.append(_cells(comment, None))
+                if stripped.startswith("%time"):  # of rostopic, in nanoseconds
+                    comments[-1][0] = "%time"
+        elif stripped:
+            body.append(stripped)
+            lines.append(number)
+    return keys, comments, lines, body
+
+
+def _take_key(comment: str, keys: dict[str, str | list[str]]) -> bool:
+    """Add ``key: value`` or ``key = value`` to the keys; whether the comment is one."""
+    match = re.match(r"([A-Za-z_][A-Za-z_ ]*?)\s*[:=]\s*(.*)", comment)
+    if match is None or not match[2]:
+        return False
+    key, value, known = match[1], match[2].strip(), sorted({*_KEYS, "attitude", "joint"} - {"times", "states"})
+    if key not in known:
+        # other comments may say what they like
+        if nearest(key, known, _LIKE):
+            raise unknown(key, known)
+        return False
+    if key in keys:
+        raise InputError(f"The key {key} stands twice.", "Give each key once.")
+    keys[key] = _numbers(key, value.strip("[]() ")) if key in LISTS else value
+    return True
+
+
+def _without_header(first: Sequence[str]) -> tuple[Sequence[str], list[str]]:
+    """The columns of a table that does not name them, by its first row, and the note that says so."""
+    width = len(first)
+    if text := next((text for text in first if not _is_number(text)), None):
+        raise InputError(f"There is no header, and {quoted(text)} of the first row is not a number.", logs.NAMES)
+    if width == len(logs.KITTI):
+        raise InputError(
+            "Rows of 12 numbers without times, as KITTI has them: the first three rows of [R p; 0 1].",
+            f"Put the time before each row, and above the first the line t {' '.join(logs.KITTI)}.",
         )
-        self.notes += notes
-        if self.keys.get("attitude") == "rotation vector":
-            names = [re.sub(r"^r_?([xyz])$", r"rotvec\1", name.strip()) for name in names]
-        meaning = observed_columns.header(names, str(self.keys.get("joint", "")))
-        logs.require_understood(names, meaning.others, [*meaning.places])
-        if meaning.time is not None:
-            self._without_repeats(meaning.time)
-        units = {"omega" if name == "framed" else name: unit.name for name, unit in meaning.units.items()}
-        said = [f"{name} in {unit}" for name, unit in units.items() if name != "position"]
-        self.notes += [f"as the header says, {', '.join(said)}"] if said else []
-        if meaning.time is not None and (meaning.units or observed_columns.is_more_than_states(meaning)):
-            self.header, others = meaning, [*meaning.others, *(names[place] for place in _parts(meaning))]
-        else:
-            places = meaning.of_state()
-            if missing := [name for name in COLUMNS if name not in places]:
-                raise _no_header(missing, names)
-            self.rows = [[row[places[name]] for name in COLUMNS] for row in self.cells]
-            others = [name for index, name in enumerate(names) if index not in places.values()]
-        self.notes += unread(others, names)
-
-    def _key(self, comment: str, known: Sequence[str]) -> bool:
-        """Take in ``key: value`` or ``key = value``; whether it was one."""
-        match = re.match(r"([A-Za-z_][A-Za-z_ ]*?)\s*[:=]\s*(.*)", comment)
-        if match is None or not match[2]:
-            return False
-        key, value = match[1], match[2].strip()
-        if key not in known:
-            # other comments may say what they like
-            if nearest(key, known, _LIKE):
-                raise unknown(key, known)
-            return False
-        if key in self.keys:
-            raise InputError(f"The key {key} stands twice.", "Give each key once.")
-        self.keys[key] = _numbers(key, value.strip("[]() ")) if key in LISTS else value
-        return True
-
-    def _without_repeats(self, index: int) -> None:
-        """Leave out rows that repeat one, and those behind a time that goes back."""
-        times = [time for row in self.cells if (time := logs.number(row[index])) is not None]
-        if len(times) == len(self.cells):
-            kept, notes, self.cut = logs.without_repeats(times, self.cells, self.lines)
-            self.cells, self.lines = [self.cells[i] for i in kept], [self.lines[i] for i in kept]
-            self.notes += notes
-
-    def _without_header(self, first: Sequence[str]) -> Sequence[str]:
-        """The columns of a table that does not name them, by its first row."""
-        width = len(first)
-        if text := next((text for text in first if not _is_number(text)), None):
-            raise InputError(f"There is no header, and {quoted(text)} of the first row is not a number.", logs.NAMES)
-        if width == len(logs.TUM) and logs.is_unit(first[-4:]):
-            self.notes.append(f"without a header the columns are taken as {' '.join(logs.TUM)}")
-            return logs.TUM
-        if width == len(logs.KITTI):
-            raise InputError(
-                "Rows of 12 numbers without times, as KITTI has them: the first three rows of [R p; 0 1].",
-                f"Put the time before each row, and above the first the line t {' '.join(logs.KITTI)}.",
-            )
-        if width != len(COLUMNS):
-            raise InputError(
-                f"The header is not {','.join(COLUMNS)}: without a header Row 1 has {width} columns, "
-                f"not {len(COLUMNS)}.",
-                "Give a header that names the columns.",
-            )
-        self.notes.append(f"without a header the columns are taken as {' '.join(COLUMNS)}")
-        return COLUMNS
+    names = logs.TUM if width == len(logs.TUM) and logs.is_unit(first[-4:]) else COLUMNS
+    if width != len(names):
+        raise InputError(
+            f"The header is not {','.join(COLUMNS)}: without a header Row 1 has {width} columns, not {len(COLUMNS)}.",
+            "Give a header that names the columns.",
+        )
+    return names, [f"without a header the columns are taken as {' '.join(names)}"]
 
 
 def _numbers(key: str, text: str) -> list[str]:
@@ -377,7 +377,7 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
         )
     is_json = text.lstrip().startswith("{") if piped else path.suffix.lower() == ".json"
     try:
-        document, notes = (_json(text), []) if is_json else _table(text, case is not None)
+        document, notes = (_json(text), []) if is_json else read_table(text, case is not None)
         name = "given" if piped else path.stem
         reader = _observed if observed_columns.is_observed(document) else _given
         trajectory = reader(document, name, case, normalize)
@@ -412,22 +412,6 @@ def _json(text: str) -> dict[str, Any]:
     for key in sorted(document.keys() - _KEYS - _NOT_READ):
         raise unknown(key, sorted(_KEYS))
     return document
-
-
-def _table(text: str, started: bool) -> tuple[dict[str, Any], list[str]]:
-    """The comments and columns of a text table, as the JSON document would hold them, and what was noticed."""
-    if "\0" in text:
-        raise InputError("A table must be text; this holds a byte 0.", REMEDY)
-    if text.count("\n") > 2 * MOST_STATES:
-        raise too_many(text.count("\n"))
-    table = TextTable(text, sorted({*_KEYS, "attitude", "joint"} - {"times", "states"}), started)
-    if table.header is not None:
-        times = [row[table.header.time or 0] for row in table.cells]
-        columns: dict[str, Any] = {"times": times, "header": table.header, "cells": table.cells, "lines": table.lines}
-    else:
-        columns = {"times": [row[0] for row in table.rows], "states": [row[1:] for row in table.rows]}
-        columns["numbers"] = [f"Line {number}" for number in table.lines]
-    return table.keys | columns | {"cut": table.cut}, table.notes
 
 
 def _given(document: dict[str, Any], stem: str, case: Case | None, normalize: bool) -> GivenTrajectory:
