@@ -1,6 +1,7 @@
 """Files of quaternions, Ω and angles by a method of its own for a body in axes of its own, with one fault each."""
 
 from collections.abc import Callable, Mapping
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,10 @@ import pytest
 from heavytop.features.score.diagnose import hypotheses
 from heavytop.features.score.measurement import assess
 from heavytop.features.score.trajectories.files import read
+from heavytop.precision import cross
+from heavytop.top.attitude import rotation_of
 from heavytop.top.bodies import Body
-from heavytop.top.equations import HEAVY_GYROSTAT
+from heavytop.top.equations import HEAVY_GYROSTAT, Parameters
 
 CENTRAL = np.array([[0.9, 0.05, -0.1], [0.05, 0.7, 0.08], [-0.1, 0.08, 0.6]])
 CENTRE, ROTOR, START = np.array([0.2, -0.3, 0.5]), np.array([0.4, -0.2, 0.3]), np.array([0.8, -0.2, 0.4, 0.4])
@@ -124,11 +127,23 @@ def test_a_plate_in_seven_digits_is_a_body(off: float) -> None:
     assert Body(inertia=(0.1, 0.2, 0.3001), **plate).warnings()
 
 
-def test_two_rotors_of_one_hash_are_two_systems() -> None:
-    """Compiled equations are kept by their name; -1.0 and -2.0 hash alike."""
-    axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    part = hypotheses._PARTS[0], (0,)
-    one, two = (hypotheses._altered(HEAVY_GYROSTAT, (k, 0.0, 0.0), axes, (part,), -1.0) for k in (-1.0, -2.0))
-    assert hash(-1.0) == hash(-2.0)
-    assert one.name != two.name
-    assert one is hypotheses._altered(HEAVY_GYROSTAT, (-1.0, 0.0, 0.0), axes, (part,), -1.0)
+def test_weights_of_one_are_the_equations_of_the_gyrostat_in_any_axes() -> None:
+    """Exactly; and each term with the weight 0 is left out, with -1 it has the other sign."""
+    k, y = (Fraction(1, 3), Fraction(-2), Fraction(5)), [Fraction(n, 7) for n in (3, -2, 5, 1, 6, -4)]
+    axes = tuple(rotation_of((Fraction(1), Fraction(2), Fraction(-1), Fraction(3))))
+    given = Parameters((Fraction(2), Fraction(3), Fraction(4)), (Fraction(1), Fraction(-2), Fraction(1, 2)), k)
+    plain = HEAVY_GYROSTAT.field(given, y)
+
+    def weighted(weights: list[int]) -> tuple[Fraction, ...]:
+        numbers = (*k, *(entry for row in axes for entry in row), *map(Fraction, weights))
+        return hypotheses._weighted(given._replace(rotor=numbers), y)
+
+    assert weighted([1] * 18) == plain
+    without_gyroscopic = weighted([0] * 3 + [1] * 15)
+    assert without_gyroscopic[:3] == tuple(
+        t / i for t, i in zip(cross(y[3:], given.moment), given.inertia, strict=True)
+    )
+    assert without_gyroscopic[3:] == plain[3:]
+    assert weighted([1] * 12 + [-1] * 6) == (*plain[:3], *(-rate for rate in plain[3:]))
+    assert weighted([1] * 9 + [-1] * 3 + [1] * 6) == (*(-rate for rate in plain[:3]), *plain[3:])
+    assert len(set(map(weighted, ([1] * n + [0] + [1] * (17 - n) for n in range(18))))) == 18

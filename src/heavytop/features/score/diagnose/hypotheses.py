@@ -10,11 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cache, lru_cache, reduce
-from itertools import count as serial
+from functools import cache
 from itertools import permutations, product
-from math import ceil, isfinite
-from operator import add
+from math import isfinite
 from typing import Any, TypeVar
 
 import numpy
@@ -31,8 +29,9 @@ from heavytop.features.score.diagnose.samples import (
     named,
     notable,
 )
-from heavytop.features.score.diagnose.search import ALIKE, FIRST, FITTED_DROP, FLOOR, LIKELY_DROP, Array, Hypothesis
+from heavytop.features.score.diagnose.search import ALIKE, FITTED_DROP, FLOOR, Array, Hypothesis
 from heavytop.precision import cross, decimal_text
+from heavytop.top.attitude import rotated, transposed
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, NAMES, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -407,106 +406,105 @@ def _text(value: Fraction) -> str:
 
 # States of other equations, in other axes or in another order of columns than can be read off a heavy top's.
 #
-# These are asked after everything simpler.
+# These are tried after everything simpler.
 
 
 _ANOTHER_MOTION = 0.03
-"""Relative errors below it are not those of another field, each of which is compiled anew."""
-_STEP = 0.05
-"""Radians that the body turns in a step of that method, ..."""
-_OF_STEPS = 1e-5
-"""... and about what its errors are in the first samples."""
-_EVERY = 0, 1, 2
-_NEXT = (1, 2), (2, 0), (0, 1)
-_LETTERS = "abc"
-_NUMBERS = serial()
+"""Relative errors below it are not those of another field."""
+_CYCLIC = (1, 2), (2, 0), (0, 1)
+_GYROSCOPIC, _TORQUE, _RATE, _GAMMA = (0,), (1, 2), (3,), (4, 5)
+"""Rows of the weights: (M + k) × Ω, both products of each component of γ × n, Ω', both products of γ × Ω."""
+_PLAIN = numpy.concatenate([numpy.zeros(3), numpy.eye(3).reshape(-1), numpy.ones(18)])
+"""No rotor, principal axes, and the equations as they are."""
 
 
 @dataclass(frozen=True, slots=True)
-class _Part:
-    """A vector of the equations, one of whose components, or all, have another factor.
+class _Weighted(System):
+    """Equations of a heavy gyrostat with a weight at each term, in the axes of a file.
 
-    of: whose derivative it enters: 0 of Ω, 1 of M, 2 of γ.  vector: from M' without the torque, γ, n, Ω and the rates,
-    in the axes of the file.  text: of one component in an equation, from the numbers of the two other axes.
+    numbers: k of the rotor, the rows of A with v_file = A v_principal, six rows of weights; they enter the compiled
+    code, which is one for all of them, as a rotor does.
     """
 
-    of: int
-    vector: Callable[..., Sequence[Any]]
-    text: str = ""
-
-
-def _halves(left: int, right: int, first: int) -> Callable[..., Sequence[Any]]:
-    """One of the two terms of each component of a cross product."""
-    sign = -1 if first else 1
-
-    def half(*vectors: Any) -> list[Any]:
-        one, other = vectors[left], vectors[right]
-        return [sign * one[pair[first]] * other[pair[1 - first]] for pair in _NEXT]
-
-    return half
-
-
-_RATES = {0: _Part(0, lambda *v: v[4][:3]), 2: _Part(2, lambda *v: v[4][3:6])}
-_GYROSCOPIC = _Part(1, lambda *v: v[0], "the gyroscopic term")
-_PARTS = (
-    _GYROSCOPIC,
-    _Part(1, lambda *v: cross(v[1], v[2]), "the torque of gravity"),
-    _Part(1, _halves(1, 2, 0), "γ{0} P {3}"),
-    _Part(1, _halves(1, 2, 1), "γ{1} P {2}"),
-    _Part(2, _halves(1, 3, 0), "γ{0} Ω{1}"),
-    _Part(2, _halves(1, 3, 1), "γ{1} Ω{0}"),
-)
-
-
-class _Altered(System):
-    """Equations with another factor somewhere; a rotor is a constant in them."""
+    numbers: tuple[float, ...] = ()
 
     def parameters(self, top: HeavyTop, start: State) -> Parameters:
-        """Those of the field: moments and n."""
-        return Parameters(top.inertia, top.moment, 0)
+        """Moments, n and the numbers."""
+        return Parameters(top.inertia, top.moment, self.numbers)
+
+    def entering(self, p: Parameters) -> tuple[Any, ...]:
+        """Moments, n and the numbers; those of the plain equations where the parameters have none."""
+        return (*p.inertia, *p.moment, *_numbers_of(p))
+
+    def taken_in(self, numbers: Sequence[Any]) -> Parameters:
+        """The parameters of these :meth:`entering` numbers."""
+        return Parameters(tuple(numbers[:3]), tuple(numbers[3:6]), tuple(numbers[6:]))
 
 
-@lru_cache(maxsize=64)
-def _altered(
-    system: System,
-    rotor: Any,
-    axes: tuple[tuple[float, ...], ...],
-    changes: tuple[tuple[_Part, tuple[int, ...]], ...],
-    factor: float,
-) -> _Altered:
-    """The system with those components of the parts, in the axes of the file, multiplied by the factor."""
-
-    def turned(vector: Sequence[Any]) -> list[Any]:
-        return [_combined(row, vector) for row in axes]
-
-    def field(p: Parameters, y: Any) -> tuple[Any, ...]:
-        rates = list(system.field(p._replace(rotor=rotor), y))
-        gamma, n = turned(y[3:6]), turned(p.moment)
-        momentum = turned([i * rate for i, rate in zip(p.inertia, rates, strict=False)])
-        gyroscopic = [m - t for m, t in zip(momentum, cross(gamma, n), strict=True)]
-        vectors = gyroscopic, gamma, n, turned(y[:3]), [*turned(rates[:3]), *turned(rates[3:6])]
-        for part, components in changes:
-            vector = part.vector(*vectors)
-            for place in range(3):
-                more = _combined([(factor - 1) * axes[i][place] for i in components], [vector[i] for i in components])
-                rates[place + 3 * (part.of == 2)] += more / p.inertia[place] if part.of == 1 else more
-        return tuple(rates)
-
-    # compiled code is kept by the name: a hash would do but for -1.0 and -2.0, which have the same
-    return _Altered(f"{system.name}_altered_{next(_NUMBERS)}", field, HEAVY_TOP.angular_velocity)
+def _numbers_of(p: Parameters) -> Sequence[Any]:
+    return p.rotor if isinstance(p.rotor, tuple) else [Fraction(number) for number in _PLAIN.tolist()]
 
 
-def _combined(weights: Sequence[float], values: Sequence[Any]) -> Any:
-    """The sum of the values times the weights that are not 0."""
-    parts = [value if weight == 1 else weight * value for weight, value in zip(weights, values, strict=True) if weight]
-    return reduce(add, parts) if parts else 0.0 * values[0]
+def _weighted(p: Parameters, y: Sequence[Any]) -> tuple[Any, ...]:
+    """(Ω', γ') with the weights of :class:`_Weighted`."""
+    rotor, first, second, third, gyroscopic, *weights = (_numbers_of(p)[i : i + 3] for i in range(0, 30, 3))
+    axes = first, second, third
+    momentum = [i * rate + k for i, rate, k in zip(p.inertia, y[:3], rotor, strict=True)]
+    omega, gamma, n, whirl = (rotated(axes, v) for v in (y[:3], y[3:6], p.moment, cross(momentum, y[:3])))
+
+    def product(vector: Sequence[Any], left: Sequence[Any], right: Sequence[Any]) -> list[Any]:
+        """γ × ``vector``, each of whose two terms has its weight."""
+        return [
+            a * (gamma[j] * vector[k]) - b * (gamma[k] * vector[j])
+            for (j, k), a, b in zip(_CYCLIC, left, right, strict=True)
+        ]
+
+    torque = product(n, weights[0], weights[1])
+    change = [w * part + own for w, part, own in zip(gyroscopic, whirl, torque, strict=True)]
+    rates = [part / i for part, i in zip(rotated(transposed(axes), change), p.inertia, strict=True)]
+    rates = [w * part for w, part in zip(weights[2], rotated(axes, rates), strict=True)]
+    return (*rotated(transposed(axes), rates), *rotated(transposed(axes), product(omega, weights[3], weights[4])))
 
 
-_SIGNS = {
-    "kinematic_sign": ((_RATES[2], _EVERY),),
-    "gyroscopic_sign": ((_GYROSCOPIC, _EVERY),),
-    "both_signs": ((_GYROSCOPIC, _EVERY), (_RATES[2], _EVERY)),
-}
+def _terms(run: Examined) -> Iterator[Hypothesis]:
+    """One equation with the other sign; one term of an equation with the other sign, or left out."""
+    for index, name in enumerate(NAMES):
+        yield _of_field(run, "component_sign", {"column": name}, _RATE if index < 3 else _GAMMA, [index % 3])
+    letters = "abc"
+    for (vector, rows, text), i in product(_TERMS, range(3)):
+        j, k = _CYCLIC[i]
+        numbers = {"column": f"{vector}{i + 1}", "term": text.format(j + 1, k + 1, letters[j], letters[k])}
+        for kind, weight in (("term_missing", 0.0), ("term_sign", -1.0)):
+            yield _of_field(run, kind, numbers, rows, [i], weight)
+
+
+_TERMS = (
+    ("M", _GYROSCOPIC, "the gyroscopic term"),
+    ("M", _TORQUE, "the torque of gravity"),
+    ("M", _TORQUE[:1], "γ{0} P {3}"),
+    ("M", _TORQUE[1:], "γ{1} P {2}"),
+    ("γ", _GAMMA[:1], "γ{0} Ω{1}"),
+    ("γ", _GAMMA[1:], "γ{1} Ω{0}"),
+)
+"""Of each term the vector whose derivative it enters, its rows of weights, and its text from the two other axes."""
+_SIGNS = {"kinematic_sign": _GAMMA, "gyroscopic_sign": _GYROSCOPIC, "both_signs": (*_GYROSCOPIC, *_GAMMA)}
+
+
+def _of_field(
+    run: Examined,
+    kind: str,
+    numbers: dict[str, str],
+    rows: Sequence[int],
+    components: Sequence[int] = (0, 1, 2),
+    weight: float = -1.0,
+) -> Hypothesis:
+    """The hypothesis of equations in which these components of these terms have that weight."""
+    weights = numpy.ones((6, 3))
+    weights[numpy.ix_(rows, components)] = weight
+    rotor = floats(run.top.rotor or (Fraction(0),) * 3)
+    values = numpy.concatenate([rotor, run.frame.axes.reshape(-1), weights.reshape(-1)]).tolist()
+    system = _Weighted("weighted_heavy_gyrostat", _weighted, HEAVY_TOP.angular_velocity, numbers=tuple(values))
+    return Hypothesis(kind, numbers, replace(run, system=system).beside(), FITTED_DROP)
 
 
 def of_equations(run: Examined, truth: Array) -> Iterator[Hypothesis]:
@@ -514,68 +512,13 @@ def of_equations(run: Examined, truth: Array) -> Iterator[Hypothesis]:
     hypotheses = [*constant_column(run, truth)]
     if len(run.frame.columns) == 6:
         hypotheses += [*_any_order(run, truth), *_axes_of_space(run, truth)]
-    errors = run.errors(truth)
-    error, early = float(errors.max()), float(errors[: FIRST[0]].max())
+    error = float(run.errors(truth).max())
     if run.system in WITH_ATTITUDE:
-        hypotheses += [_of_field(run, early, kind, {}, changes) for kind, changes in _SIGNS.items()]
+        hypotheses += [_of_field(run, kind, {}, rows) for kind, rows in _SIGNS.items()]
     yield from hypotheses
     nothing = all(hypothesis.left() * FITTED_DROP > error for hypothesis in hypotheses)
     if run.system in WITH_ATTITUDE and error > _ANOTHER_MOTION and nothing:
-        yield from _terms(run, early)
-
-
-def _terms(run: Examined, early: float) -> Iterator[Hypothesis]:
-    """One equation with the other sign; one term of an equation with the other sign, or left out."""
-    for index, name in enumerate(NAMES):
-        rates = _RATES[0 if index < 3 else 2]
-        yield _of_field(run, early, "component_sign", {"column": name}, ((rates, (index % 3,)),))
-    for part, i in product(_PARTS, range(3)):
-        j, k = _NEXT[i]
-        text = part.text.format(j + 1, k + 1, _LETTERS[j], _LETTERS[k])
-        numbers = {"column": f"{'γ' if part.of == 2 else 'M'}{i + 1}", "term": text}
-        for kind, factor in (("term_missing", 0.0), ("term_sign", -1.0)):
-            yield _of_field(run, early, kind, numbers, ((part, (i,)),), factor)
-
-
-def _of_field(
-    run: Examined,
-    early: float,
-    kind: str,
-    numbers: dict[str, str],
-    changes: tuple[tuple[_Part, tuple[int, ...]], ...],
-    factor: float = -1.0,
-) -> Hypothesis:
-    """The error that a change of the field leaves; infinite where that of the first samples does not fall with it."""
-    rotor = run.system.parameters(run.top, run.start).mapped(float).rotor
-    axes = tuple(map(tuple, run.frame.axes.tolist()))
-    other = replace(run, system=_altered(run.system, rotor, axes, changes, factor))
-    begins = _begins_so(other, max(early / LIKELY_DROP, _OF_STEPS))
-    return Hypothesis(kind, numbers, other.beside() if begins else run.errors(None), FITTED_DROP)
-
-
-def _begins_so(given: Examined, allowed: float) -> bool:
-    """Whether the first samples are those of the system within ``allowed``, by the classical Runge-Kutta method: no
-    field has to be compiled for that.
-    """
-    p = given.system.parameters(given.top, given.start).mapped(float)
-    y, time = numpy.array([float(value) for value in given.start.flat]), 0.0
-
-    def rates(y: Array) -> Array:
-        return numpy.array(given.system.field(p, y.tolist()))
-
-    for row in given.rows[: FIRST[0]]:
-        sample = given.at([row])
-        end = float(sample.times[0])
-        count = ceil(abs(end - time) * given.rate / _STEP)
-        for h in [(end - time) / max(count, 1)] * count:
-            a = rates(y)
-            b = rates(y + h / 2 * a)
-            c = rates(y + h / 2 * b)
-            y = y + h / 6 * (a + 2 * b + 2 * c + rates(y + h * c))
-        time = end
-        if not sample.errors((y.reshape(-1, 2, 3) @ given.frame.axes.T).reshape(-1, 6)).max() <= allowed:
-            return False
-    return True
+        yield from _terms(run)
 
 
 def _axes_of_space(run: Examined, truth: Array) -> Iterator[Hypothesis]:
