@@ -36,17 +36,17 @@ class Pairs:
 
     @classmethod
     def nearest(cls, values: Any) -> Pairs:
-        """The nearest to an array of exact numbers, given as lists."""
+        """The nearest pairs to nested lists of exact numbers."""
         numbers = numpy.array(values, object)
         high = numbers.astype(float)
         return cls(high, (numbers - numpy.vectorize(Fraction, [object])(high)).astype(float))
 
     def __add__(self, other: Pairs | Doubles | float) -> Pairs:
-        one = Pairs.of(other)
-        total, off = _two_sum(self.high, one.high)
-        low, rest = _two_sum(self.low, one.low)
-        total, off = _quick(total, off + low)
-        return type(self)(*_quick(total, off + rest))
+        addend = Pairs.of(other)
+        total, error = _two_sum(self.high, addend.high)
+        low, low_error = _two_sum(self.low, addend.low)
+        total, error = _quick(total, error + low)
+        return type(self)(*_quick(total, error + low_error))
 
     __radd__ = __add__
 
@@ -61,20 +61,20 @@ class Pairs:
         return opposite.__add__(other)
 
     def __mul__(self, other: Pairs | Doubles | float) -> Pairs:
-        one = Pairs.of(other)
-        product, off = _two_product(self.high, one.high)
-        return type(self)(*_quick(product, off + (self.high * one.low + self.low * one.high)))
+        factor = Pairs.of(other)
+        product, error = _two_product(self.high, factor.high)
+        return type(self)(*_quick(product, error + (self.high * factor.low + self.low * factor.high)))
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: Pairs | Doubles | float) -> Pairs:
-        one = Pairs.of(other)
-        first = self.high / one.high
-        rest = self - one * first
-        second = rest.high / one.high
-        third = (rest - one * second).high / one.high
-        two = Pairs(*_quick(*_two_sum(first, second)))
-        return two.__add__(third)
+        divisor = Pairs.of(other)
+        first = self.high / divisor.high
+        remainder = self - divisor * first
+        second = remainder.high / divisor.high
+        third = (remainder - divisor * second).high / divisor.high
+        leading = Pairs(*_quick(*_two_sum(first, second)))
+        return leading.__add__(third)
 
     def __getitem__(self, where: Any) -> Pairs:
         return type(self)(self.high[where], self.low[where])
@@ -93,10 +93,10 @@ class Numerators(Pairs):
     __slots__ = ()
 
     def __truediv__(self, other: Any) -> Any:
-        words, rest = [], self
+        words, remainder = [], self
         for _ in range(3):
-            words.append(rest.high / other.high)
-            rest = rest.__sub__(other * words[-1])  # type: ignore[assignment]
+            words.append(remainder.high / other.high)
+            remainder = remainder.__sub__(other * words[-1])  # type: ignore[assignment]
         return numpy.array(words)
 
 

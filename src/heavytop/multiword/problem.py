@@ -32,7 +32,7 @@ from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, Parameters, System
 
 
 class Status(Enum):
-    """How an advance ended."""
+    """The outcome of an advance."""
 
     OK = 0
     NON_FINITE = 1
@@ -41,7 +41,7 @@ class Status(Enum):
 
 
 class Steps(ABC):
-    """A motion on its way, in scaled units; its time is |τ|.
+    """An integration in progress, in scaled units; its time is |τ|.
 
     steps: taken so far.  forwards: whether time is positive.
     """
@@ -57,43 +57,43 @@ class Steps(ABC):
     @property
     @abstractmethod
     def time(self) -> Fraction:
-        """Where the last step ended, exactly."""
+        """The exact time at the end of the last step."""
 
     @property
     @abstractmethod
     def state(self) -> tuple[Fraction, ...]:
-        """Where the motion is at the end of the last step."""
+        """The exact state at the end of the last step."""
 
     @abstractmethod
     def advance(self, target: Fraction, steps: int) -> Status:
-        """Take steps, at most so many, until the last covers ``target``."""
+        """Take at most ``steps`` steps, until the last covers ``target``."""
 
     @abstractmethod
     def sample(self, time: Fraction) -> tuple[Fraction, ...] | None:
-        """The state at a time inside the last step; changes nothing.  None where the numbers outgrow their words."""
+        """The state at a time inside the last step, without side effects; None where numbers overflow their words."""
 
     @abstractmethod
     def coefficients(self, n: int) -> tuple[Fraction, ...]:
-        """y_n h^n of the last step, exactly as it was computed."""
+        """y_n h^n of the last step, as the exact values of its words."""
 
 
 class ResumableRun(Steps):
-    """A motion that can be taken up again where it was left."""
+    """An integration that can be resumed."""
 
     @abstractmethod
     def place(self) -> tuple[str, ...]:
-        """Where the last step began, as text: all that is needed to go on from there to the same bits."""
+        """The beginning of the last step as text, sufficient to resume with the same bits."""
 
     @abstractmethod
     def restore(self, numbers: tuple[str, ...], steps: int) -> None:
-        """Go back to that place, after so many steps."""
+        """Resume from a :meth:`place`; steps: taken before it."""
 
 
-# A problem in units in which its numbers are near 1, exactly.
+# A problem in exact units in which its numbers are near 1.
 #
 # Ω = s ω, t = τ/s, γ = g γ', ξ = x ξ' with powers of two s, g, x: then ω' = A ω ω + (B/s²) g γ' + (C/s) ω, and the
-# equations keep their form.  All of it is exact, and whatever the units of the data, the arithmetic sees numbers of
-# moderate size.
+# equations keep their form.  The scaling is exact, and the arithmetic has numbers of moderate size for data in any
+# units.
 
 
 _ROOT_BITS = 24
@@ -101,8 +101,10 @@ _ROOT_BITS = 24
 
 @dataclass(frozen=True, slots=True)
 class Scaled:
-    """state: (Ω, γ) or (Ω, γ, ξ), exact, in these units.  rate: s, in units of 1/t.  sizes: what each component is in
-    units of.  rest: whether the derivative is exactly 0.
+    """A problem in scaled units.
+
+    state: (Ω, γ) or (Ω, γ, ξ), exact.  rate: s, in units of 1/t.  sizes: the unit of each component.  rest: whether the
+    derivative is exactly 0.
     """
 
     system: System
@@ -116,7 +118,7 @@ class Scaled:
     def of(cls, system: System, p: Parameters, y: tuple[Fraction, ...], bounded: bool = False) -> Scaled:
         """The problem with parameters ``p`` that starts at ``y``, six or nine exact numbers.
 
-        bounded: with |ω| <= 4 at all times, by the first integrals, in place of |ω| near 1 at the start.
+        bounded: scale to |ω| <= 4 at all times, by the first integrals, instead of |ω| near 1 at the start.
         """
         constants = coefficients(system, p, len(y) == 9)
         gamma = _power_above(max(map(abs, y[3:6])))
@@ -125,7 +127,7 @@ class Scaled:
         scaled = constants.with_linear(gamma / rate**2, 1 / rate)
         state = tuple(value / size for value, size in zip(y, sizes, strict=True))
         omega = system.angular_velocity(p, y[:6])
-        # most motions turn γ, which two products show
+        # cheap: γ turns on most motions
         turning = any(any(cross(vector, omega)) for vector in (y[3:6], y[6:]) if vector)
         rest = not turning and not any(system.field(p, y[:6]))
         return cls(system, scaled, state, rate, tuple(sizes), rest)
@@ -151,19 +153,19 @@ def _rate(
 def _bound(system: System, p: Parameters, y: tuple[Fraction, ...]) -> Fraction:
     """A power of two not less than |Ω_i| at any time: from the energy, or from |M| and the rotor of the gyrostat."""
     omega, gamma = y[:3], y[3:6]
-    least = min(p.inertia)
+    smallest = min(p.inertia)
     if system is GYROSTAT:
-        square = sum((i * w) ** 2 for i, w in zip(p.inertia, omega, strict=True)) / least**2
+        square = sum((i * w) ** 2 for i, w in zip(p.inertia, omega, strict=True)) / smallest**2
         return _root_above(max(square, Fraction(p.rotor) ** 2)) or Fraction(1)
     kinetic = sum(i * w * w for i, w in zip(p.inertia, omega, strict=True)) / 2
     torque = _root(sum(n * n for n in p.moment) * sum(g * g for g in gamma))
-    turning = max(map(abs, p.rotor)) / least if system is HEAVY_GYROSTAT else Fraction(0)
+    turning = max(map(abs, p.rotor)) / smallest if system is HEAVY_GYROSTAT else Fraction(0)
     by_rotor = _power_above(turning) if turning else Fraction(0)
-    return max(_root_above(2 * (kinetic + 2 * torque) / least), by_rotor) or Fraction(1)
+    return max(_root_above(2 * (kinetic + 2 * torque) / smallest), by_rotor) or Fraction(1)
 
 
 def _root(value: Fraction) -> Fraction:
-    """Not less than √value, and at most a millionth larger; 0 for 0."""
+    """An upper bound of √value, at most a millionth too large; 0 for 0."""
     if value == 0:
         return value
     unit = Fraction(2) ** _ROOT_BITS / _root_above(value)

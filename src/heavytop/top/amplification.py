@@ -33,9 +33,9 @@ _TOLERANCE = 2.0**-52
 _STEPS = 1000
 """Beyond so many steps the amplification is extrapolated."""
 FOLLOWED = 1e14
-"""Beyond this loss a motion computed in double is another one: it goes on as it has grown until there."""
+"""Beyond this loss a motion in double is another one, and the loss is extrapolated."""
 _STEEPER = 100.0
-"""Amplification grows like t along a regular motion; so many times more than that is taken as exponential growth."""
+"""Amplification grows like t along a regular motion; growth so many times larger counts as exponential."""
 _LARGEST = 1e300
 
 
@@ -79,13 +79,12 @@ def amplification(
 
 
 def loss(system: System, parameters: Parameters, start: tuple[Fraction, ...], horizon: Fraction) -> tuple[float, bool]:
-    """How many relative roundings of its components, made at the worst time, the error of a state amounts to by
-    ``horizon``; and whether that is followed so far, not a lower estimate.
+    """The error of a state at ``horizon`` over a relative rounding error of its components at the worst time; and
+    whether it was computed up to there, not a lower estimate.
 
-    A component that stays 0 is not rounded, and one that is small is by as much less: 1 of a motion that keeps to an
-    invariant plane, however unstable that is.  Arguments: as in :func:`amplification`.  Followed in the 64 bits of
-    numpy's longdouble, where it has them, as far as double does not do; a regular motion after many
-    steps in proportion to t.
+    A component that stays 0 has no rounding error, and a small one a small error: the loss is 1 for a motion in an
+    invariant plane, however unstable that is.  Arguments: as in :func:`amplification`.  Beyond the range of double it
+    is computed in the 64 bits of numpy's longdouble, if available; a regular motion after many steps grows like t.
     """
     try:
         _, lost, done, span = _followed(system, parameters, start, horizon, _STEPS)
@@ -105,7 +104,7 @@ def _followed(
     steps: int,
     wide: bool = False,
 ) -> tuple[float, float, float, float]:
-    """Amplification and loss up to the time followed; that time, and the horizon, times the rate."""
+    """Amplification and loss up to the end of the computation; its time, and the horizon, times the rate."""
     scale = rate(system, parameters, start)
     if not scale or not horizon:
         return 1.0, 1.0, 0.0, 0.0
@@ -124,13 +123,13 @@ def _taken_apart(system: System, p: Parameters, scale: Fraction) -> tuple[Double
     units = [mpq(unit) for unit in _units(scale)]
     size, exactly = mpq(scale), p.mapped(mpq)
 
-    def field(*places: int) -> list[tuple[mpq, mpq]]:
+    def field(*axes: int) -> list[tuple[mpq, mpq]]:
         """(even, odd) part of each rate."""
-        y = [places.count(k) * unit for k, unit in enumerate(units)]
-        there, opposite = system.field(exactly, y), system.field(exactly, [-value for value in y])
+        y = [axes.count(k) * unit for k, unit in enumerate(units)]
+        forwards, backwards = system.field(exactly, y), system.field(exactly, [-value for value in y])
         return [
             ((a + b) / (2 * unit * size), (a - b) / (2 * unit * size))
-            for a, b, unit in zip(there, opposite, units, strict=True)
+            for a, b, unit in zip(forwards, backwards, units, strict=True)
         ]
 
     single = [field(j) for j in range(6)]
@@ -139,8 +138,8 @@ def _taken_apart(system: System, p: Parameters, scale: Fraction) -> tuple[Double
     for j in range(6):
         products[:, j, j] = [_nearest(even) for even, _ in single[j]]
         for k in range(j + 1, 6):
-            both = zip(field(j, k), single[j], single[k], strict=True)
-            products[:, j, k] = products[:, k, j] = [_nearest((a[0] - b[0] - c[0]) / 2) for a, b, c in both]
+            parts = zip(field(j, k), single[j], single[k], strict=True)
+            products[:, j, k] = products[:, k, j] = [_nearest((a[0] - b[0] - c[0]) / 2) for a, b, c in parts]
     return linear, products
 
 
@@ -152,9 +151,9 @@ def _nearest(value: mpq | Fraction) -> numpy.longdouble:
 
 
 class _Path:
-    """A motion and its Φ, followed by full steps as far as anyone asked; every format and horizon shares it.
+    """A motion and its Φ, in full steps up to the latest request, shared by all formats and horizons.
 
-    Each entry of ``_steps``: the time after a step, and the largest amplification and loss up to it.  ``_carried``:
+    ``_steps``: the time after each step, and the largest amplification and loss up to it.  ``_carried``:
     Φ(t, s), shape (6, steps, 6), from the beginning s of each step; ``_sizes``: |y(s)|, shape (steps, 6).
     """
 
@@ -168,7 +167,7 @@ class _Path:
         self._lock = Lock()
 
     def largest(self, span: float, steps: int) -> tuple[float, float, float]:
-        """The largest amplification and loss up to ``span``, or as far as ``steps`` steps go, and how far that is."""
+        """The largest amplification and loss up to ``span``, or up to the end of ``steps`` steps, and that time."""
         with self._lock:
             while not self._ended and self._steps[-1][0] < span and len(self._steps) <= steps:
                 self._ended = not self._advance()
@@ -182,7 +181,7 @@ class _Path:
         return largest, lost, span
 
     def _advance(self) -> bool:
-        """One step; whether another may follow: not where Φ is beyond double, time stands still or all is lost."""
+        """Take one step; False at the end: where Φ overflows, the time does not advance or all digits are lost."""
         time, largest, lost = self._steps[-1]
         series = _series(self._linear, self._twice, self._state)
         last = max(float(numpy.abs(series[order]).max()) ** (1 / order) for order in (_ORDER - 1, _ORDER))
@@ -190,15 +189,15 @@ class _Path:
             self._steps.append((math.inf, largest, lost))
             return False
         step = _TOLERANCE ** (1 / _ORDER) / last
-        there = numpy.tensordot(self._state.dtype.type(step) ** numpy.arange(_ORDER + 1), series, 1)
+        combined = numpy.tensordot(self._state.dtype.type(step) ** numpy.arange(_ORDER + 1), series, 1)
         carried = numpy.concatenate([self._carried, numpy.eye(6)[:, None]], 1).reshape(6, -1)
         with numpy.errstate(over="ignore", invalid="ignore"):
-            self._carried = (there[:, 1:] @ carried).reshape(6, -1, 6)
+            self._carried = (combined[:, 1:] @ carried).reshape(6, -1, 6)
             self._sizes = numpy.concatenate([self._sizes, numpy.abs(self._state)[None]])
             squares = (self._carried**2).sum(axis=0)
             size = math.sqrt(squares.sum(axis=1).max() / 6)
             error = math.sqrt((squares * self._sizes**2).sum(axis=1).max())
-        self._state = there[:, 0]
+        self._state = combined[:, 0]
         if not (math.isfinite(size) and math.isfinite(error)) or time + step == time:
             return False
         self._steps.append((time + step, max(largest, size), max(lost, error)))
@@ -227,7 +226,7 @@ def _series(linear: Doubles | None, twice: Doubles, state: Doubles) -> Doubles:
     series[0, :, 0], series[0, :, 1:] = state, numpy.eye(6)
     columns, shares = series.reshape(-1, 7), numpy.array([0.5, 1, 1, 1, 1, 1, 1])
     for n in range(_ORDER):
-        offset = 6 * (_ORDER - 1 - n)  # the latest first, as the sum takes them
+        offset = 6 * (_ORDER - 1 - n)  # the latest first, in the order of the sum
         jacobians[:, offset : offset + 6] = (twice @ series[n, :, 0]).reshape(6, 6)
         sums = shares * (jacobians[:, offset:] @ columns[: 6 * n + 6])
         if linear is not None:

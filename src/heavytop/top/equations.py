@@ -115,8 +115,8 @@ def _of_full_tensor(p: Parameters, y: Sequence[Scalar], rotor: Sequence[Scalar] 
     omega, gamma = y[:3], y[3:6]
     m = tuple(dot(row, omega) for row in rows)
     if rotor is not None:
-        m = tuple(own + part for own, part in zip(m, rotor, strict=True))
-    torque = tuple(own + part for own, part in zip(cross(m, omega), cross(gamma, p.moment), strict=True))
+        m = tuple(first + part for first, part in zip(m, rotor, strict=True))
+    torque = tuple(first + part for first, part in zip(cross(m, omega), cross(gamma, p.moment), strict=True))
     adjugate = (
         (b * c - d * d, d * e - c * f, d * f - b * e),
         (d * e - c * f, a * c - e * e, e * f - a * d),
@@ -153,7 +153,7 @@ class System:
     enters: tuple[str, ...] = ("inertia", "moment")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A system that comes back from another process is the same object."""
+        """Pickle by name, so that a system is the same object in every process."""
         return system, (self.name,)
 
     def parameters(self, top: HeavyTop, start: State) -> Parameters:
@@ -164,16 +164,16 @@ class System:
         return Parameters(top.inertia, top.moment, rotor(top, start) if self is GYROSTAT else 0)
 
     def entering(self, p: Parameters) -> tuple[Any, ...]:
-        """The numbers that enter the field, one after the other: what compiled code is given."""
+        """The numbers that enter the field, in order: the arguments of compiled code."""
         return tuple(value for name in self.enters for value in (p.rotors if name == "rotor" else getattr(p, name)))
 
     def taken_in(self, numbers: Sequence[Any]) -> Parameters:
         """The parameters of these :meth:`entering` numbers; None for what does not enter."""
         parameters: dict[str, Any] = dict.fromkeys(Parameters._fields)
-        rest = list(numbers)
+        remaining = list(numbers)
         for name in self.enters:
             size = 1 if name == "rotor" and self is GYROSTAT else 3
-            part, rest = tuple(rest[:size]), rest[size:]
+            part, remaining = tuple(remaining[:size]), remaining[size:]
             parameters[name] = part if size == 3 else part[0]
         return Parameters(**parameters)
 
@@ -214,11 +214,11 @@ def rotor(top: HeavyTop, start: State) -> Fraction:
         raise InputError(
             "The gyrostat needs M·gamma != 0: its lambda is P b / (M·gamma).", "Choose a start that turns about gamma."
         )
-    off = cross(momentum, start.gamma)
-    if any(off):
+    across = cross(momentum, start.gamma)
+    if any(across):
         raise InputError(
             "The gyrostat needs gamma parallel to M, as (2.1) claims: "
-            f"M x gamma = ({', '.join(f'{float(x):.6g}' for x in off)}).",
+            f"M x gamma = ({', '.join(f'{float(x):.6g}' for x in across)}).",
             "Take gamma = M/|M| with a rational |M|.",
         )
     return top.moment[1] / area
@@ -240,16 +240,16 @@ def system(name: str) -> System:
 
 
 class WithRotor(Protocol):
-    """A top or a body, as far as the choice of the system goes."""
+    """A top or a body that may have a rotor."""
 
     @property
     def rotor(self) -> Vector | None: ...
 
 
 def system_of(chosen: System | str | None, *tops: WithRotor) -> System:
-    """The system asked for; where none is, `heavy_gyrostat` if a top has a rotor, else `heavy_top`.
+    """The requested system; by default `heavy_gyrostat` if a top has a rotor, else `heavy_top`.
 
-    Raises InputError for an unknown name, and for a system that does not know the rotor of a top.
+    Raises InputError for an unknown name, and for a system that does not admit the rotor of a top.
     """
     if chosen is None:
         return HEAVY_TOP if all(top.rotor is None for top in tops) else HEAVY_GYROSTAT
@@ -260,7 +260,7 @@ def system_of(chosen: System | str | None, *tops: WithRotor) -> System:
 
 
 def require_no_other_rotor(chosen: System, top: WithRotor) -> None:
-    """Raises InputError where the top has a rotor and the system another one, or none."""
+    """Raise InputError where the top has a rotor and the system another one, or none."""
     if top.rotor is not None and chosen is not HEAVY_GYROSTAT:
         why = "takes its rotor from the start" if chosen is GYROSTAT else "has no rotor"
         raise InputError(
@@ -269,7 +269,7 @@ def require_no_other_rotor(chosen: System, top: WithRotor) -> None:
         )
 
 
-# First integrals and invariant relations, written once over any ring, each with the tops and starts it holds for.
+# First integrals and invariant relations, written once over any ring, with the tops and starts for which they hold.
 #
 # Every integral takes (Parameters, y) with y in the order of the state.  Cases count up to a renaming of the axes:
 # a renaming of odd sign turns Ω into -Ω, which changes no integral here but for its own sign.
@@ -280,7 +280,7 @@ Axes = tuple[int, ...]
 
 @dataclass(frozen=True, slots=True)
 class Integral:
-    """A function that stays constant along the motions of ``system`` it is offered for.
+    """A function that is constant along the motions for which :func:`holding` returns it.
 
     name: as it appears in reports.
     value: the function, over any ring.
@@ -422,8 +422,8 @@ def largest(integral: Integral, p: Parameters, omega: Any) -> Any:
 def holding(top: HeavyTop, start: State, system: System | None = None) -> tuple[Integral, ...]:
     """Every integral that holds for this top and start, found by exact rational tests on the exact data.
 
-    system: without it the heavy gyrostat of a top with a rotor, else the heavy top.
-    Invariant relations (Goryachev-Chaplygin, Hess) are offered only for starts on them.
+    system: by default the heavy gyrostat of a top with a rotor, else the heavy top.
+    Invariant relations (Goryachev-Chaplygin, Hess) are returned only for starts on them.
     """
     square = Integral("gamma_squared", gamma_squared)
     system = system or system_of(None, top)
@@ -514,7 +514,7 @@ def square_of_rate(system: System, p: Parameters, y: tuple[Any, ...]) -> Any:
 
 
 def component(name: str) -> int:
-    """The place of a component in the state, by a name such as omega1 or γ3; raises InputError for another."""
+    """The index of a component in the state, by a name such as omega1 or γ3; raises InputError for another name."""
     plain = str(name).strip()
     for greek, latin in (("Ω", "omega"), ("\N{OHM SIGN}", "omega"), ("γ", "gamma")):
         plain = plain.replace(greek, latin)

@@ -99,13 +99,13 @@ class HeavyTop:
 
     def angular_momentum(self, omega: Any) -> tuple[Any, Any, Any]:
         """M = IΩ, and k where there is a rotor, over any ring that rationals act on."""
-        own = self.inertia[0] * omega[0], self.inertia[1] * omega[1], self.inertia[2] * omega[2]
+        momentum = self.inertia[0] * omega[0], self.inertia[1] * omega[1], self.inertia[2] * omega[2]
         if self.rotor is None:
-            return own
-        return own[0] + self.rotor[0], own[1] + self.rotor[1], own[2] + self.rotor[2]
+            return momentum
+        return momentum[0] + self.rotor[0], momentum[1] + self.rotor[1], momentum[2] + self.rotor[2]
 
     def warnings(self) -> list[str]:
-        """Moments that no rigid body has, though the equations do not mind: one larger than the sum of the others."""
+        """Warnings of moments that no rigid body has, though the equations admit them."""
         sentences = []
         for axis, value in enumerate(self.inertia):
             others = sum(self.inertia) - value
@@ -118,7 +118,7 @@ class HeavyTop:
 
 
 def require_physical(top: HeavyTop, start: State) -> None:
-    """Raises InputError for data beyond 10^150, and moments below 10^-150, which overflow in some float on the way."""
+    """Raise InputError for data beyond 10^150, and moments below 10^-150, which overflow in intermediate doubles."""
     _require_physical_top(top)
     for what, values in (("omega", start.omega), ("gamma", start.gamma)):
         for value in values:
@@ -162,8 +162,8 @@ class State:
         omega_space: Iterable[Any] | None = None,
     ) -> None:
         if (omega is None) == (omega_space is None):
-            both = "both omega and omega_space were" if omega is not None else "neither omega nor omega_space was"
-            raise InputError(f"Of the angular velocity {both} given.", "Give one of them: body axes, or space axes.")
+            which = "both omega and omega_space were" if omega is not None else "neither omega nor omega_space was"
+            raise InputError(f"Of the angular velocity {which} given.", "Give one of them: body axes, or space axes.")
         if attitude is None:
             if gamma is None:
                 raise InputError("Neither gamma nor an attitude was given.", "Give gamma, or an Attitude.")
@@ -200,17 +200,17 @@ class State:
 
     def require_unit_gamma(self, slack: Fraction = Fraction(0), remedy: str = _NORMALIZE) -> State:
         """This state; raises InputError with that remedy unless | |γ|² − 1 | ≤ ``slack``."""
-        off = dot(self.gamma, self.gamma) - 1
+        excess = dot(self.gamma, self.gamma) - 1
         if not any(self.gamma):
             raise InputError(_NO_DIRECTION, _UPWARDS)
-        if abs(off) > slack:
-            size = decimal_text(round_to(off, _SHOWN_BITS), 6)  # of a million digits else
-            most = f", where {decimal_text(round_to(slack, _SHOWN_BITS), 2)} is allowed" if slack else ""
-            raise InputError(f"gamma is not a unit vector: |gamma|^2 - 1 = {size}{most}.", remedy)
+        if abs(excess) > slack:
+            size = decimal_text(round_to(excess, _SHOWN_BITS), 6)  # of a million digits else
+            allowance = f", where {decimal_text(round_to(slack, _SHOWN_BITS), 2)} is allowed" if slack else ""
+            raise InputError(f"gamma is not a unit vector: |gamma|^2 - 1 = {size}{allowance}.", remedy)
         return self
 
     def unit_gamma_nearby(self) -> str:
-        """How to repair a γ off length 1, where nothing can do it for the user: one near it in full."""
+        """A remedy for |γ| ≠ 1 in full: a unit vector near γ."""
         if not any(self.gamma):
             return "Give the components of a unit vector, such as 3/5, 0, 4/5."
         near = ", ".join(map(str, self.normalized(_NEAR_BITS).gamma))
@@ -246,7 +246,7 @@ def data_texts(top: HeavyTop, start: State) -> dict[str, str | list[str]]:
 
 
 def _text(value: Fraction | Vector) -> str:
-    """A number or three as one would write them in Python; long ones to six digits."""
+    """A number or three numbers as Python source; long ones to six digits."""
     if isinstance(value, tuple):
         return f"({', '.join(map(_text, value))})"
     text = shown(value)
@@ -263,17 +263,17 @@ def _require_same_gamma(gamma: Vector, up: Vector, attitude: Attitude) -> None:
         )
 
 
-# The times at which a motion is asked for.
+# The times of a motion.
 
 
 _SMALL, _LARGE = 1e-300, 1e149
-"""Between them a nearest double is rounded relatively, and no time is too large."""
+"""The range of times whose nearest doubles have a small relative error and cannot overflow."""
 _LONGEST = 60
-"""Digits of a time that is written as a decimal; a fraction is shorter than a longer one."""
+"""The most digits of a time in decimals; longer ones are written as fractions."""
 
 
 class TimeText(str):
-    """A time as exact text, as it was given: ``12345.678``, ``1e3`` or ``1/3``.
+    """A time as its exact input text: ``12345.678``, ``1e3`` or ``1/3``.
 
     ``float`` of it is the nearest double, ``Fraction`` of it the number itself.
     """
@@ -287,8 +287,8 @@ class TimeText(str):
     def of(cls, value: Given) -> TimeText:
         """The text of a time.
 
-        Text stays as it is; of a float and of any other number the exact decimal, where it has one of up to 60 digits,
-        else the fraction.  Raises InputError for what is not a number.
+        Text is unchanged; a float or another number becomes its exact decimal of up to 60 digits, else a fraction.
+         Raises InputError for what is not a number.
         """
         number = exact(value)
         if isinstance(value, str):
@@ -298,26 +298,26 @@ class TimeText(str):
         if isinstance(value, Fraction):
             return cls(exact_text(value))
         twos = (number.denominator & -number.denominator).bit_length() - 1
-        places = twos  # of a binary number; of any other the division below leaves a rest
-        if number.denominator != 1 << twos or places > _LONGEST:
+        decimals = twos  # of a binary number; of any other the division below leaves a rest
+        if number.denominator != 1 << twos or decimals > _LONGEST:
             return cls(exact_text(number))
-        digits = abs(number.numerator) * 5**places
-        text = str(Decimal(digits)).rjust(places + 1, "0")
-        text = f"{text[: len(text) - places]}.{text[len(text) - places :]}" if places else text
+        digits = abs(number.numerator) * 5**decimals
+        text = str(Decimal(digits)).rjust(decimals + 1, "0")
+        text = f"{text[: len(text) - decimals]}.{text[len(text) - decimals :]}" if decimals else text
         return cls(f"-{text}" if number < 0 else text)
 
 
 class CheckedTimes(list[Fraction]):
-    """Exact times that were checked.
+    """Exact times after their check.
 
-    doubles: the nearest to each; empty where these alone do not show that the times are in order.
+    doubles: the nearest doubles; empty where these do not prove that the times are in order.
     """
 
     doubles: list[float]
 
 
 class RoundedTimes(Sequence[Fraction]):
-    """Times that were rounded to a format: numbers of it, each made exact when it is asked for."""
+    """Times rounded to a format: its numbers, each converted to an exact one on access."""
 
     __slots__ = ("numbers",)
 
@@ -342,9 +342,9 @@ class RoundedTimes(Sequence[Fraction]):
 
 
 class DoubleTimes(RoundedTimes):
-    """Times that were given as doubles and checked.
+    """Times from doubles after their check.
 
-    doubles: an array of them.
+    doubles: an array.
     """
 
     __slots__ = ()
@@ -372,7 +372,7 @@ def check_times(times: Iterable[Any]) -> CheckedTimes | DoubleTimes:
 
 
 def _as_doubles(times: Any) -> Any:
-    """An array of the times where they are doubles and, as they stand, in order; None where each is to be looked at."""
+    """An array of the times where they are ordered doubles; None where each needs a check."""
     import numpy
 
     floats = isinstance(times, list | tuple) and set(map(type, times)) == {float}
@@ -388,9 +388,9 @@ def _as_doubles(times: Any) -> Any:
 
 
 def _in_order(values: list[Fraction]) -> list[float]:
-    """The nearest doubles, where they are of one sign, grow strictly and are far from the ends of the doubles.
+    """The nearest doubles, where they have one sign, grow strictly and are far from the limits of doubles.
 
-    What is rounded to different doubles is in their order, so these times need not be compared.
+    Numbers that round to different doubles are in the order of these, so the times need no comparison.
     """
     try:
         doubles = [above / below for above, below in map(Fraction.as_integer_ratio, values)]

@@ -1,8 +1,8 @@
-"""Inertia tensors that no body has, or that are implausible, and the slip in writing them down that makes them right.
+"""Inertia tensors that no body has, or that are implausible, and the slip that explains them.
 
 A tensor J about the centre of mass is that of a body where ∫ x xᵀ dm = ½ tr J − J is positive semidefinite (the
-triangle inequality of the principal moments) and J itself is positive definite.  Everything is exact; what rounding of
-the printed numbers leaves open is a slack that is given.
+triangle inequality of the principal moments) and J itself is positive definite.  All tests are exact, with a slack
+for the rounding of the printed numbers.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ _PLAUSIBLE = (0.05, _DENSEST)
 _FAR_CENTRE = 100
 """Sizes of the body between its axes and its centre of mass."""
 _ROUND = 10
-"""By so much the products of inertia shrink without Steiner's part where the tensor was meant about the pivot."""
+"""The least factor by which the products of inertia shrink without Steiner's part of a tensor about the pivot."""
 _APART = Fraction(1, 20)
-"""Relative distance of a tensor from that of the geometry in the file from which on it is another."""
+"""The relative distance from which on a tensor differs from that of the geometry in the file."""
 _HULL, _END = 3, 5
 """Largest second moments of a body within a box, a cylinder or a sphere, in those of the uniform shape: their trace, as
 with all mass in the corners of a box; along an axis, as in two poles of a sphere."""
@@ -47,7 +47,7 @@ _SHOWN_BITS = 56
 
 @dataclass(frozen=True, slots=True)
 class MassProperties:
-    """Mass properties as they were written down.
+    """Mass properties as in the file.
 
     six: the tensor in the order of :data:`Six`, about the centre of mass, or about the pivot where ``at_pivot``.
     centre: of mass, from the pivot.  slack: rounding of the printed numbers, of any entry.  si: kg and metres.
@@ -73,9 +73,9 @@ class MassProperties:
 
 @dataclass(frozen=True, slots=True)
 class Slip:
-    """A mistake in writing a tensor down that makes this one right.
+    """A slip that explains a tensor.
 
-    inertia: the mended six numbers, None for one that the file does not hold.  mass, centre: mended, None where right.
+    inertia: the corrected six numbers, None for one that the file lacks.  mass, centre: corrected, None if correct.
     """
 
     name: str
@@ -159,7 +159,7 @@ def is_positive(tensor: Tensor) -> bool:
 
 
 def mending(body: MassProperties) -> str:
-    """The likeliest slip as a sentence, with the mended numbers; empty where none makes the tensor that of a body."""
+    """The likeliest slip as a sentence with the corrected numbers; empty where none makes the tensor that of a body."""
     for slip in slips(body):
         if None in slip.inertia or slip.inertia == body.six:
             return slip.sentence
@@ -171,8 +171,8 @@ def mending(body: MassProperties) -> str:
 def realisable(central: Tensor, slack: Fraction = Fraction(0)) -> bool:
     """Whether a body has this tensor about its centre of mass: positive moments, triangle inequality."""
     # a moment that is 0 within rounding, or below it: all mass lies on a line, or is missing
-    least = max(slack, _SMALL * max(map(abs, six_of(central))))
-    return has_second_moments(central, slack) and is_positive(central) and _semidefinite(central, -least)
+    floor = max(slack, _SMALL * max(map(abs, six_of(central))))
+    return has_second_moments(central, slack) and is_positive(central) and _semidefinite(central, -floor)
 
 
 def slips(body: MassProperties) -> list[Slip]:
@@ -206,7 +206,7 @@ def _rod(body: MassProperties) -> Slip:
 
 
 def _mends(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
-    """Each slip, with the mass properties that it would mean."""
+    """Each slip, with the mass properties that it implies."""
     n = body.six
     for six, which in (
         (
@@ -249,7 +249,7 @@ def _mend(body: MassProperties, name: str, sentence: str, six: Sequence[Fraction
 
 
 def _row_major(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
-    """The first six of the nine numbers of a matrix in the six places; its last one is not there."""
+    """The slip of the first six of the nine numbers of a matrix in place of the six; its last one is missing."""
     n = body.six
     if abs(n[1] - n[3]) > _SMALL * max(map(abs, n)):
         return
@@ -322,7 +322,7 @@ def _products(body: MassProperties) -> Fraction:
 
 
 def _of_products(body: MassProperties) -> Iterator[Slip]:
-    """Whether the tensor without Steiner's part is that of a body, and all but diagonal where it was not."""
+    """The slip of a tensor that without Steiner's part is that of a body, and nearly diagonal."""
     if body.at_pivot or body.geometry is not None:
         return
     less = six_of(minus(rows(body.six), steiner(body.mass, body.centre)))
@@ -346,16 +346,16 @@ def _in_shape(body: MassProperties) -> bool:
     if body.geometry is None or (axes := body.geometry_axes) is None:
         return True
     moments = (second_moments(tensor) for tensor in (body.central, body.geometry))
-    own, uniform = (multiplied(transposed(axes), multiplied(tensor, axes)) for tensor in moments)
-    return all(own[i][i] <= _END * body.mass * uniform[i][i] + body.slack for i in range(3))
+    body_moments, uniform = (multiplied(transposed(axes), multiplied(tensor, axes)) for tensor in moments)
+    return all(body_moments[i][i] <= _END * body.mass * uniform[i][i] + body.slack for i in range(3))
 
 
 def _beyond_shape(body: MassProperties) -> Iterator[Slip]:
-    """Whether the radius of gyration exceeds that of all bodies within the shape of the file."""
+    """The finding that the radius of gyration exceeds that of all bodies within the shape of the file."""
     if body.geometry is not None and (ratio := _trace_ratio(body)) > _HULL:
         half = sum(body.geometry[i][i] for i in range(3)) / 2
-        own, most = (decimal_text(Fraction(math.sqrt(factor * half)), 3) for factor in (ratio, _HULL))
-        sentence = f"The radius of gyration is {own} m; within the shape in the file it is at most {most} m."
+        radius, limit = (decimal_text(Fraction(math.sqrt(factor * half)), 3) for factor in (ratio, _HULL))
+        sentence = f"The radius of gyration is {radius} m; within the shape in the file it is at most {limit} m."
         yield Slip("beyond_shape", sentence, body.six)
 
 

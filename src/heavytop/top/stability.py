@@ -2,10 +2,10 @@
 
 Linearised about a steady motion, the field has eigenvalues ±λ beside those, 0, of its conserved quantities: λ² are the
 roots of a polynomial of degree one (of Ω alone, where γ does not enter its rates) or two, of rational coefficients.
-One of them that is positive or not real proves the motion unstable, at the rate max Re λ.  That none is proves nothing
+A positive or complex root proves the motion unstable, at the rate max Re λ.  The absence of such a root proves nothing
 by itself.  A free body of two equal moments that turns about an axis between them is unstable without one: its Jordan
 block is a constant part ε of Ω along the axis of symmetry, by which Ω turns at a rate in proportion to ε.
-Stable is said where the second variation of E − ω M·γ − κ γ²/2 − c G is definite on the level of the two
+The verdict is *stable* where the second variation of E − ω M·γ − κ γ²/2 − c G is definite on the level of the two
 Casimir functions (Arnold's energy-Casimir method; G is |M|²/2 of a free body, M_k of a top symmetric about axis k), and
 of a regular precession of Lagrange's top, whose inclination is a minimum of the effective potential.
 """
@@ -40,7 +40,7 @@ class Stability:
 
     @property
     def why(self) -> str:
-        """The reason, behind the verdict; empty where an eigenvalue or an energy proves it."""
+        """The reason of the verdict; empty where an eigenvalue or an energy proves it."""
         if self.drift:
             return f": a part ε of Ω along the axis of symmetry turns it away linearly, by {self.drift:.4g} ε t"
         return (
@@ -50,7 +50,7 @@ class Stability:
         )
 
     def text(self, bits: int = 53) -> str:
-        """A sentence; bits: of a rounding whose growth is told."""
+        """A sentence; bits: of the rounding error whose growth it states."""
         if not self.rate:
             return f"{self.motion}, {self.verdict}{self.why}"
         until = bits * math.log(2) / self.rate
@@ -86,8 +86,8 @@ def _drift(system: System, p: Parameters, y: Sequence[Fraction]) -> float:
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
         if p.inertia[i] == p.inertia[j] and not rotor[i] and not rotor[j]:
-            beside = system.field(p, [value + (n == k) for n, value in enumerate(y)])
-            if square := beside[i] ** 2 + beside[j] ** 2:
+            rates = system.field(p, [value + (n == k) for n, value in enumerate(y)])
+            if square := rates[i] ** 2 + rates[j] ** 2:
                 return _root(square / (y[i] ** 2 + y[j] ** 2))
     return 0.0
 
@@ -144,8 +144,8 @@ def _words(system: System, p: Parameters, y: Sequence[Fraction], free: bool) -> 
         return "equilibrium"
     if len(set(p.inertia)) == 3 and len(turning) == 1 and free:
         return f"permanent rotation about the {_AXES[sorted(p.inertia).index(p.inertia[turning[0]])]} axis"
-    about = f"axis {turning[0] + 1}" if len(turning) == 1 else "an axis fixed in the body"
-    return f"permanent rotation about {about}"
+    axis = f"axis {turning[0] + 1}" if len(turning) == 1 else "an axis fixed in the body"
+    return f"permanent rotation about {axis}"
 
 
 def is_stable(p: Parameters, y: Sequence[Any], sign: Callable[[Any], int | None]) -> bool:
@@ -163,7 +163,7 @@ def is_stable(p: Parameters, y: Sequence[Any], sign: Callable[[Any], int | None]
 
 
 def _second_variations(p: Parameters, y: Sequence[Any]) -> Iterator[tuple[list[Any], list[Any], Matrix]]:
-    """(what must be positive, what must be 0, the form) on the tangent space δM·γ + M·δγ = 0, γ·δγ = 0."""
+    """(quantities to be positive, quantities to be 0, the form) on the tangent space δM·γ + M·δγ = 0, γ·δγ = 0."""
     gamma, momentum = y[3:], [i * w for i, w in zip(p.inertia, y[:3], strict=True)]
     square, spin = dot(gamma, gamma), dot(momentum, gamma)
     for turning, gradient, curvature, zeros, squares in _multipliers(p, y, momentum):
@@ -184,7 +184,7 @@ def _form(p: Parameters, turning: Any, curvature: Any, kappa: Any, a: Sequence[A
 
 
 def _multipliers(p: Parameters, y: Sequence[Any], momentum: Sequence[Any]) -> Iterator[tuple[Any, ...]]:
-    """ω, c ∇G and c G'' by M, what must be 0 for G to be an integral, and what is divided by: without G, and with each.
+    """ω, c ∇G and c G'' by M, the quantities that are 0 if G is an integral, and the divisors; without G, and for each.
 
     −ω of the free body makes the form definite about the axis of the smallest moment, M·γ/(2 I) that of a sleeping top.
     """
@@ -212,7 +212,7 @@ def _determinant(rows: Matrix) -> Any:
 
 
 def _precession(system: System, p: Parameters, y: Sequence[Fraction]) -> Stability | None:
-    """A precession of Lagrange's top, or of a free body of revolution: where its inclination stays."""
+    """A precession of constant inclination of Lagrange's top, or of a free body of revolution; None for others."""
     if system is not HEAVY_TOP:
         return None
     for k in range(3):

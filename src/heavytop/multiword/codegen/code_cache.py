@@ -1,8 +1,8 @@
-"""Machine code on disk, from one process to the next.
+"""A cache of machine code on disk, shared by processes.
 
-A file is named by what its code follows from: the text of this package, the function that writes it and its arguments,
-processor and compiler.  It begins with the SHA-256 of all that follows, which is read back and compared; a file that is
-damaged, of another name or another owner's counts as none, and a folder that cannot be written is left alone.
+The name of a file is a hash of all that determines its code: the text of this package, the function that writes it and
+its arguments, processor and compiler.  The file begins with the SHA-256 of its content; a file that is damaged, has
+another name or belongs to another user is ignored, and a folder that cannot be written is not used.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from heavytop.files import cache_folder, line, replace, verified
 from heavytop.top.equations import System
 
 _MOST_FILES = 100
-"""So many are kept, the last ones that were written."""
+"""The number of files kept; the oldest are deleted."""
 
 
 def key_of(function: Any, arguments: tuple[Any, ...], processor: object) -> str:
-    """The name of the code of a function with these arguments."""
+    """The name of the file for the code of a function with these arguments."""
     values = [value.name if isinstance(value, System) else repr(value) for value in arguments]
     text = repr((_program(), function.__module__, function.__qualname__, values, processor))
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def read(key: str) -> tuple[bytes, bytes] | None:
-    """The code of a name and what stands beside it; None without one that can be trusted."""
+    """The code of a name and its note; None without a valid file."""
     try:
         with (cache_folder("multiword") / key).open("rb") as file:
             status = os.fstat(file.fileno())
@@ -49,7 +49,7 @@ def read(key: str) -> tuple[bytes, bytes] | None:
 
 
 def write(key: str, code: bytes, beside: bytes) -> None:
-    """Keep the code of a name where that is possible; beside: one line."""
+    """Store the code of a name if possible; beside: a note of one line."""
     with suppress(OSError, InputError):
         folder = cache_folder("multiword")
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -59,7 +59,7 @@ def write(key: str, code: bytes, beside: bytes) -> None:
 
 
 def _is_own(status: os.stat_result) -> bool:
-    """Whether a file is the user's, who alone may write to it."""
+    """Whether a file belongs to the user and only the user may write to it."""
     if not hasattr(os, "getuid"):
         return True
     return status.st_uid == os.getuid() and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)

@@ -1,4 +1,4 @@
-"""Machine code out of LLVM's intermediate representation: compiled in memory, at the first use, once."""
+"""Machine code from LLVM's intermediate representation, compiled in memory at its first use."""
 
 from __future__ import annotations
 
@@ -47,9 +47,9 @@ _started = False
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """Compiled functions by name; they keep nothing between calls, so that any thread may call them at any time.
+    """Compiled functions by name, without state and so safe in threads.
 
-    seconds: what compiling or reading took.  engine: keeps the machine code in memory.
+    seconds: of compiling or reading.  engine: keeps the machine code in memory.
     code, signatures: the machine code as a file, and the types of its functions.
     """
 
@@ -62,7 +62,7 @@ class Machine:
 
 @dataclass(frozen=True, slots=True)
 class Processor:
-    """The processor that code is made for.  name: of LLVM, such as ``x86-64-v3``.  features: such as ``+avx2``.
+    """The target processor.  name: of LLVM, such as ``x86-64-v3``.  features: such as ``+avx2``.
 
     The bits of all results are the same for every processor.
     """
@@ -77,14 +77,14 @@ class Processor:
 
     @classmethod
     def here(cls) -> Processor:
-        """The one that this runs on."""
+        """The processor of this machine."""
         from llvmlite import binding
 
         return cls(binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten())
 
 
 def once(make: Callable[P, Machine]) -> Callable[P, Machine]:
-    """``make``, called once for the same arguments, or its machine code from the disk: other threads that ask wait."""
+    """Cache ``make`` by its arguments, in memory and on disk; other threads wait meanwhile."""
     making, made, signature = Lock(), dict[tuple[Any, ...], Machine](), inspect.signature(make)
     full = len(signature.parameters)
 
@@ -103,7 +103,7 @@ def once(make: Callable[P, Machine]) -> Callable[P, Machine]:
 
 
 def _from_disk(make: Callable[..., Machine], arguments: tuple[Any, ...]) -> Machine:
-    """The machine code as an earlier process left it, else made now and left for later ones."""
+    """The machine code from the cache on disk, or made now and stored there."""
     began = perf_counter()
     key = code_cache.key_of(make, arguments, Processor.here())
     if (cached := code_cache.read(key)) is not None:
@@ -125,9 +125,9 @@ def compiled(module: ir.Module, processor: Processor | None = None) -> Machine:
         target = _target(processor)
         parsed = binding.parse_assembly(str(module))
         parsed.verify()
-        # the code is as it shall be; above 1, loads that several orders share are kept on the stack
+        # no inlining or unrolling; above 1, loads that several orders share are spilled to the stack
         options = binding.create_pipeline_tuning_options(speed_level=0)
-        # the code is vectors already; reordering of sums is not allowed anyway
+        # the code consists of vectors already, and sums must not be reordered
         options.loop_vectorization = False
         options.slp_vectorization = False
         passes = binding.create_pass_builder(target, options)
@@ -148,12 +148,12 @@ def _target(processor: Processor | None) -> Any:
         binding.initialize_native_asmprinter()
         _started = True
     which = processor or Processor.here()
-    # any address: the loader puts code and constants where there is room
+    # the loader may place code and constants at any address
     return binding.Target.from_default_triple().create_target_machine(cpu=which.name, features=which.features, opt=3)
 
 
 def _linked(code: bytes, signatures: Signatures, began: float) -> Machine:
-    """Functions out of machine code."""
+    """Load functions from machine code."""
     from llvmlite import binding
 
     with _building:
@@ -182,7 +182,7 @@ def pointer(array: Doubles | Integers) -> Any:
 # Vectors of eight doubles in LLVM's intermediate representation, and loops over them.
 #
 # Every operation is one IEEE operation, rounded to nearest: no fast-math flag is ever set and nothing is contracted, so
-# the bits are those of any processor.  Only ``fma`` fuses, and without such an instruction it is computed.
+# the bits are those of any processor.  Only ``fma`` fuses; without such an instruction it is emulated.
 
 
 LANES = 8
@@ -200,7 +200,7 @@ _INFINITY = float("inf")
 
 
 def _operator(of_doubles: str, of_integers: str, swapped: bool = False) -> Callable[[Operand, Number], Operand]:
-    """Writes one operation, by its name of LLVM's builder."""
+    """An operator that writes one operation, by its name in LLVM's builder."""
 
     def written(self: Operand, other: Number) -> Operand:
         write = getattr(self.builder, of_doubles if _is_double(self.type) else of_integers)
@@ -228,8 +228,8 @@ def _conversion(operation: str, to: ir.Type) -> Callable[[Operand], Operand]:
 class Operand:
     """A double, an integer, a flag, eight of one of these, or an address of the machine code, and its arithmetic.
 
-    An operator writes one operation, of doubles or of integers as the type says; a number beside it is a constant
-    of its type.  LLVM's builder takes it as it is.
+    An operator writes one operation, of doubles or of integers by the type; a number operand becomes a constant of that
+    type.  LLVM's builder accepts operands as values.
     """
 
     __slots__ = ("builder", "raw", "type")
@@ -258,7 +258,7 @@ class Operand:
         return Operand(self.builder, self.builder.not_(self.raw))
 
     def get_reference(self) -> str:
-        """As LLVM's builder asks for it."""
+        """The reference that LLVM's builder needs."""
         return str(self.raw.get_reference())
 
     def __bool__(self) -> bool:
@@ -266,7 +266,7 @@ class Operand:
 
 
 Number: TypeAlias = float | Operand
-"""A number known when the code is made, or an operand."""
+"""A number known when the code is written, or an operand."""
 Index: TypeAlias = int | Operand
 Pair: TypeAlias = tuple[Operand, Operand]
 
@@ -286,9 +286,9 @@ def _typed(kind: ir.Type, value: Number) -> ir.Value:
 
 
 class Code:
-    """Writes the body of one function; a value is a vector of eight doubles where nothing else is said.
+    """Writes the body of one function; values are vectors of eight doubles unless stated otherwise.
 
-    true: a flag.  null: an address where nothing is.
+    true: a flag.  null: the null address.
     """
 
     def __init__(self, builder: ir.IRBuilder) -> None:
@@ -303,8 +303,8 @@ class Code:
         return Operand(self.builder, raw)
 
     def _intrinsic(self, name: str, result: ir.Type, arguments: Sequence[ir.Value]) -> Operand:
-        known = self.module.globals.get(name)
-        function = known or ir.Function(self.module, ir.FunctionType(result, [a.type for a in arguments]), name)
+        declared = self.module.globals.get(name)
+        function = declared or ir.Function(self.module, ir.FunctionType(result, [a.type for a in arguments]), name)
         return self.value(self.builder.call(function, arguments))
 
     def call(self, function: ir.Function, arguments: Sequence[Operand]) -> Operand:
@@ -320,7 +320,7 @@ class Code:
         return self.value(ir.Constant(INT, value)) if isinstance(value, int) else value
 
     def select(self, condition: Operand, a: Number, b: Number) -> Operand:
-        """``a`` where a bit is set, else ``b``; both may be numbers, of the type that they have in Python."""
+        """``a`` where a bit is set, else ``b``; two numbers have their type in Python."""
         kind = INT if isinstance(a, int) else DOUBLE
         kinds = [value.type for value in (a, b) if isinstance(value, Operand)] or [_like(condition.type, kind)]
         return self.value(self.builder.select(condition.raw, _typed(kinds[0], a), _typed(kinds[0], b)))
@@ -335,7 +335,7 @@ class Code:
         return self._intrinsic(name, a.type, (a.raw, _typed(a.type, b), _typed(a.type, c)))
 
     def multiply_add(self, a: Operand, b: Number, c: Operand) -> Operand:
-        """a b + c where that is exact with and without a rounding of a b: the same bits, however it is computed."""
+        """a b + c where a b is exact, so that fused and separate operations give the same bits."""
         return self._intrinsic("llvm.fmuladd.v8f64", VECTOR, (a.raw, _typed(VECTOR, b), c.raw))
 
     def floor(self, a: Operand) -> Operand:
@@ -408,7 +408,7 @@ class Code:
         return self.builder.gep(base.raw, [_typed(INT, offset)])
 
     def address(self, base: Operand, offset: Index) -> Operand:
-        """Where ``base[offset]`` is."""
+        """The address of ``base[offset]``."""
         return self.value(self._place(base, offset))
 
     def load_one(self, base: Operand, offset: Index) -> Operand:
@@ -416,7 +416,7 @@ class Code:
         return self.value(self.builder.load(self._place(base, offset)))
 
     def store_one(self, value: Number, base: Operand, offset: Index) -> None:
-        """Put a double or an integer to ``base[offset]``."""
+        """Store a double or an integer at ``base[offset]``."""
         self.builder.store(_typed(base.type.pointee, value), self._place(base, offset))
 
     def load(self, base: Operand, offset: Index) -> Operand:
@@ -424,15 +424,15 @@ class Code:
         return self.value(self.builder.load(self.builder.bitcast(self._place(base, offset), _VECTOR_POINTER), align=64))
 
     def store(self, value: Operand, base: Operand, offset: Index) -> None:
-        """Put eight doubles to ``base[offset]`` and on, aligned to 64 bytes."""
+        """Store eight doubles from ``base[offset]`` on, aligned to 64 bytes."""
         self.builder.store(value.raw, self.builder.bitcast(self._place(base, offset), _VECTOR_POINTER), align=64)
 
     def phi(self, kind: ir.Type) -> Operand:
-        """A value or another, as :meth:`add_incoming` says for each block before."""
+        """A phi node, whose values :meth:`add_incoming` sets for each preceding block."""
         return self.value(self.builder.phi(kind))
 
     def add_incoming(self, phis: Sequence[Operand], values: Sequence[Number], before: Any = None) -> None:
-        """The values of ``phis`` behind the block ``before``, or behind the one that is being written."""
+        """Set the values of ``phis`` after the block ``before``, by default after the current block."""
         for phi, value in zip(phis, values, strict=True):
             phi.raw.add_incoming(_typed(phi.type, value), before or self.builder.block)
 
@@ -473,7 +473,7 @@ class Code:
         body: Callable[..., Sequence[Operand]],
         values: Sequence[Operand],
     ) -> list[Operand]:
-        """``values`` after ``values = body(*values)`` as long as ``holds(*values)``."""
+        """``values`` after repeating ``values = body(*values)`` while ``holds(*values)``."""
         b = self.builder
         before, head = b.block, b.append_basic_block("head")
         b.branch(head)
@@ -491,7 +491,7 @@ class Code:
     def either(
         self, condition: Operand, one: Callable[[], list[Operand]], other: Callable[[], list[Operand]]
     ) -> list[Operand]:
-        """The values of ``one`` where a bit is set, else those of ``other``; the other's code does not run."""
+        """The values of ``one`` where a bit is set, else those of ``other``; only one of them is executed."""
         b = self.builder
         with b.if_else(condition) as (then, otherwise):
             with then:
@@ -505,7 +505,7 @@ class Code:
 
 
 def function(module: ir.Module, name: str, result: ir.Type, arguments: Sequence[ir.Type]) -> tuple[ir.Function, Code]:
-    """A new function of ``module`` whose pointers point to different places, and the writer of its body."""
+    """A new function of ``module`` whose pointers do not alias, and the writer of its body."""
     made = ir.Function(module, ir.FunctionType(result, list(arguments)), name)
     for argument in made.args:
         if isinstance(argument.type, ir.PointerType):
@@ -513,14 +513,14 @@ def function(module: ir.Module, name: str, result: ir.Type, arguments: Sequence[
     return made, Code(ir.IRBuilder(made.append_basic_block("entry")))
 
 
-# The loop of steps, in machine code: until the time covers a target, a step fails or there were enough.
+# The loop of steps in machine code, until the time covers a target, a step fails or the limit is reached.
 
 
 class Stepping(ABC):
     """Writes a function that takes steps.
 
-    clock, counts: arrays of doubles and of integers that live between calls.  most: the steps of a call at most.
-    status: the place among the counts of how the last step ended; 0 if well.
+    clock, counts: arrays of doubles and of integers that persist between calls.  most: the largest number of steps of a
+    call.  status: the index in the counts of the outcome of the last step; 0 for success.
     """
 
     def __init__(self, code: Code, clock: Operand, counts: Operand, most: Operand, status: int) -> None:
@@ -528,26 +528,26 @@ class Stepping(ABC):
 
     @abstractmethod
     def covered(self) -> Operand:
-        """Whether the time is the target or behind it, a bit."""
+        """Whether the time has reached the target, a bit."""
 
     @abstractmethod
     def write_step(self) -> Operand:
-        """Write one step; gives the bit that says whether it stands."""
+        """Write one step; returns the bit whether it is accepted."""
 
     def time(self, index: int) -> Operand:
         """A double of the clock."""
         return self.code.load_one(self.clock, index)
 
     def count(self, index: int) -> Operand:
-        """A count, by its place."""
+        """A count, by its index."""
         return self.code.load_one(self.counts, index)
 
     def set_count(self, value: Index, index: int) -> None:
-        """Put one of the counts."""
+        """Store one of the counts."""
         self.code.store_one(value, self.counts, index)
 
     def write(self) -> None:
-        """The loop; the function gives the number of steps that stand."""
+        """Write the loop; the function returns the number of accepted steps."""
 
         def wanted(taken: Operand) -> Operand:
             running = self.count(self.status) == 0
@@ -561,9 +561,9 @@ class Stepping(ABC):
 
 
 class Following(ABC):
-    """Writes a function that takes steps and samples by turns, until all times are done or there were enough steps.
+    """Writes a function that alternates steps and samples, until all times are done or the limit of steps is reached.
 
-    arrays: what the function ``advance`` takes but its number of steps.  clock, counts, status: as of
+    arrays: the arguments of the function ``advance`` but its number of steps.  clock, counts, status: as of
     :class:`Stepping`.
     progress: times and steps done.  times_count: of the times.  most: of the steps.  result: of the samples.
     """
@@ -582,11 +582,11 @@ class Following(ABC):
 
     @abstractmethod
     def aim(self, index: Operand) -> None:
-        """Make a time the target of ``advance``."""
+        """Set a time as the target of ``advance``."""
 
     @abstractmethod
     def put(self, done: Operand, head: Any, otherwise: Any) -> None:
-        """Write samples from the time ``done`` on and go to ``head``, or to ``otherwise`` where there are none."""
+        """Write samples from the time ``done`` on and branch to ``head``, or to ``otherwise`` where there are none."""
 
     def write(self, advance: Any) -> None:
         """The loop over times and steps."""
@@ -596,8 +596,8 @@ class Following(ABC):
         b.position_at_end(head)
         done, taken = (code.load_one(self.progress, index) for index in range(2))
         running = code.load_one(self.counts, self.status) == 0
-        left = (done < self.times_count) & (taken < self.most)
-        b.cbranch(running & left, inside, out)
+        pending = (done < self.times_count) & (taken < self.most)
+        b.cbranch(running & pending, inside, out)
         b.position_at_end(inside)
         b.cbranch(self.covered(done), sample, step)
         b.position_at_end(step)

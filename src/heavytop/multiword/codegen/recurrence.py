@@ -16,7 +16,7 @@ from heavytop.multiword.codegen.machine_code import Code, Index, Operand, Pair
 from heavytop.multiword.double_double.arithmetic import Constant, accumulated, add, by_constant, divided
 from heavytop.top.equations import Parameters, System
 
-# Where in eight lanes the products of the three fields are.
+# The layout of the products of the three fields in eight lanes.
 #
 # A state vector holds Ω1 Ω2 Ω3 γ1 γ2 γ3 in lanes 0 to 5; an attitude vector ξ lies in lanes 3 to 5 of a second one,
 # whose other lanes are 0.  Lanes 6 and 7 are 0.  The products of Taylor series that the fields need are then, lane by
@@ -29,7 +29,7 @@ from heavytop.top.equations import Parameters, System
 #
 #     y' = A ∘ (S permuted and added) + Σ_l B_l ∘ (y permuted),
 #
-# with A = 1/2 in lanes 3 to 5.  A and B are not written down here: they are read off the field.
+# with A = 1/2 in lanes 3 to 5.  A and B are computed from the field.
 
 
 ZERO = 6
@@ -66,7 +66,7 @@ _TURNED: dict[str, tuple[tuple[int, ...], ...]] = {
     "heavy_gyrostat": (*_TORQUE, *_TURNING),
 }
 _TORQUES = {"heavy_top": 2, "gyrostat": 0, "heavy_gyrostat": 2}
-"""How many of them, the first, are of γ in the rate of Ω."""
+"""The number of them, the first, that multiply γ in the rate of Ω."""
 
 
 _BESIDE: dict[str, tuple[tuple[int, ...], ...]] = {
@@ -77,7 +77,7 @@ _BESIDE: dict[str, tuple[tuple[int, ...], ...]] = {
 
 
 def paired_permutations(system: System) -> tuple[tuple[tuple[int, ...], ...], bool]:
-    """The permutations of y in the linear part, two as one; whether lanes 3 to 5, the second, are added to 0 to 2."""
+    """The permutations of y in the linear part, two combined; whether lanes 3 to 5 are then added to 0 to 2."""
     return _BESIDE[system.name], len(_TURNED[system.name]) > 1
 
 
@@ -90,8 +90,8 @@ def permutations(system: System) -> tuple[tuple[int, ...], ...]:
 class Coefficients:
     """A and B_l of each state vector, eight exact numbers each: shape (vectors, 1 + number of permutations, 8).
 
-    torques: how many B_l, the first, are of γ in the rate of Ω.  torque, turning: the largest |coefficient| of the
-    first vector in those and in the others.
+    torques: the number of B_l, the first, that multiply γ in the rate of Ω.  torque, turning: the largest |coefficient|
+    of the first vector in those and in the others.
     """
 
     vectors: tuple[tuple[tuple[Fraction, ...], ...], ...]
@@ -115,7 +115,7 @@ class Coefficients:
         )
 
     def with_linear(self, torque: Fraction, turning: Fraction) -> Coefficients:
-        """These coefficients with B multiplied: those of γ in the rate of Ω by ``torque``, others by ``turning``."""
+        """The coefficients with scaled B: by ``torque`` where they multiply γ in the rate of Ω, else by ``turning``."""
         factors = [Fraction(1), *(torque if k < self.torques else turning for k in range(len(self.vectors[0]) - 1))]
         return Coefficients(
             tuple(
@@ -163,12 +163,12 @@ def _eight(row: Sequence[Any]) -> tuple[Fraction, ...]:
 
 
 def rates(system: System, coefficients: Coefficients, y: Sequence[Any]) -> list[Any]:
-    """The derivative of (Ω, γ) or (Ω, γ, ξ) as the lanes compute it, exactly for exact numbers of any kind."""
+    """The derivative of (Ω, γ) or (Ω, γ, ξ) by the formula of the lanes, exact for exact numbers."""
     return series_rates(system, coefficients, [y])
 
 
 def series_rates(system: System, coefficients: Coefficients, series: Sequence[Sequence[Any]]) -> list[Any]:
-    """Coefficient n of the derivative of a motion whose Taylor coefficients from 0 to n these are."""
+    """Coefficient n of the derivative of a motion, from its Taylor coefficients 0 to n."""
     lanes = [[[*y[:6], 0, 0], [0, 0, 0, *y[6:], 0, 0]][: len(coefficients.vectors)] for y in series]
     right = [_side(y[0], RIGHT) for y in reversed(lanes)]
     rates: list[Any] = []
@@ -196,7 +196,7 @@ _NONE = 8
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Where numbers lie: each vector of a row is eight doubles.
+    """The layout of arrays: each vector of a row is eight doubles.
 
     vectors: 1, or 2 with an attitude.  linear: permutations in the linear part.
     """
@@ -228,15 +228,15 @@ class Layout:
 
     @property
     def units(self) -> int:
-        """Where the units of split coefficients are in a state."""
+        """Offset in a state of the units of split coefficients."""
         return 16 * self.vectors
 
     def left(self, vector: int) -> int:
-        """Where L of a vector is in a row; its low word is 8 behind, as all low words are."""
+        """Offset in a row of L of a vector; low words follow 8 doubles later."""
         return 32 + 48 * vector
 
     def value(self, vector: int) -> int:
-        """Where y of a vector is in a row."""
+        """Offset in a row of y of a vector."""
         return 64 + 48 * vector
 
 
@@ -259,11 +259,11 @@ class Recurrence:
         return range(self.layout.vectors)
 
     def row(self, n: Index) -> Operand:
-        """Where the row of order n begins."""
+        """The address of the row of order n."""
         return self.code.address(self.scratch, self.code.integer(n) * self.layout.row)
 
     def pair(self, row: Operand, offset: int) -> Pair:
-        """Both words of what lies there."""
+        """Both words of a pair at the offset."""
         return self.code.load(row, offset), self.code.load(row, offset + 8)
 
     def _side_pair(self, y: Pair, which: Sum) -> Pair:
@@ -279,16 +279,16 @@ class Recurrence:
 
     def put(self, n: Index, y: list[Pair]) -> None:
         row = self.row(n)
-        places = [(self._side_pair(y[0], RIGHT), 0)]
+        sides = [(self._side_pair(y[0], RIGHT), 0)]
         for vector in self.vectors:
-            places.append((self._side_pair(y[vector], LEFT), self.layout.left(vector)))
-            places.append((y[vector], self.layout.value(vector)))
-        for pair, offset in places:
+            sides.append((self._side_pair(y[vector], LEFT), self.layout.left(vector)))
+            sides.append((y[vector], self.layout.value(vector)))
+        for pair, offset in sides:
             for word in range(2):
                 self.code.store(pair[word], row, offset + 8 * word)
 
     def _put_plain(self, n: Index, y: list[Operand]) -> list[Operand]:
-        """Store a row; gives R, each L and each y."""
+        """Store a row; returns R, each L and each y."""
         row = self.row(n)
         right, left = self.side(y[0], RIGHT), [self.side(value, LEFT) for value in y]
         self.code.store(right, row, 0)
@@ -315,7 +315,7 @@ class Recurrence:
         ]
 
     def _gather(self, word: Operand, part: int) -> Operand:
-        """A summand of the products, of four, without its signs; 0 where absent."""
+        """One of four summands of the products, without its signs; 0 where absent."""
         lanes = [lane if sign else _NONE for lane, sign in GATHERED[part]]
         return self.code.shuffle(word, self.code.zero, [*lanes, _NONE, _NONE])
 
@@ -323,7 +323,7 @@ class Recurrence:
         return value if min(_signs(part)) >= 0 else value * self.code.constant(_signs(part))
 
     def _anywhere(self, word: Operand, part: int) -> Operand:
-        """A summand, of four, and any number where absent."""
+        """One of four summands; an arbitrary number where absent."""
         return self.code.shuffle(word, word, [*(lane for lane, _ in GATHERED[part]), 0, 0])
 
     def constant(self, vector: int, row: int) -> Constant:
@@ -379,11 +379,11 @@ class Recurrence:
         a = self._over(n, vector, 0)
         # two sums side by side, the signs in the factors
         first, second, third, fourth = ((self._gather(total, k), self._signed(a, k)) for k in range(4))
-        one = code.fma(*second, code.fma(*first, linear))
-        return one + code.fma(*fourth, third[0] * third[1])
+        first_sum = code.fma(*second, code.fma(*first, linear))
+        return first_sum + code.fma(*fourth, third[0] * third[1])
 
     def orders_in_pairs(self, first: list[Pair], low_order: Operand) -> list[Operand]:
-        """y_1 to y_n0, the last returned; the products of y_n come last, so that the others need not wait for it."""
+        """Write y_1 to y_n0 and return the last; the products of y_n come last, as the others need not wait for it."""
         code, zeros = self.code, [self.code.zero] * (2 * len(self.vectors))
 
         def order(n: Operand, words: list[Operand]) -> list[Operand]:
@@ -401,7 +401,7 @@ class Recurrence:
         return [word for pair in following for word in pair]
 
     def plain_orders(self, low_order: Operand, order: Operand, last: list[Operand]) -> None:
-        """y_(n0+1) to y_N in plain doubles; each order has its own code, entered at n0 and left at N."""
+        """Write y_(n0+1) to y_N in plain doubles; each order has its own code, entered at n0 and left at N."""
         code, b, row = self.code, self.code.builder, self.row(low_order)
         sides = [code.load(row, offset) for offset in (0, *map(self.layout.left, self.vectors))]
         after = b.append_basic_block("summed")
@@ -411,22 +411,22 @@ class Recurrence:
         for n, block in blocks.items():
             switch.add_case(n, block)
             b.position_at_end(block)
-            known = [code.phi(value.type) for value in (*sides, *last)]
-            code.add_incoming(known, [*sides, *last], entry)
+            carried = [code.phi(value.type) for value in (*sides, *last)]
+            code.add_incoming(carried, [*sides, *last], entry)
             if incoming is not None:
-                code.add_incoming(known, incoming, before)
-            incoming, before = self._plain_order(n, known), block
-            following = blocks.get(n + 1, after)
-            b.cbranch(order == n + 1, after, following)
+                code.add_incoming(carried, incoming, before)
+            incoming, before = self._plain_order(n, carried), block
+            next_block = blocks.get(n + 1, after)
+            b.cbranch(order == n + 1, after, next_block)
         b.position_at_end(after)
 
-    def _plain_order(self, n: int, known: list[Operand]) -> list[Operand]:
+    def _plain_order(self, n: int, values: list[Operand]) -> list[Operand]:
         """R, each L and each y of order n + 1 from those of n, with four sums side by side.
 
-        The products of y_n come last, and do not wait until it is stored.
+        The products of y_n come last, from registers.
         """
         code, width = self.code, len(self.vectors)
-        right, left, y = known[0], known[1 : 1 + width], known[1 + width :]
+        right, left, y = values[0], values[1 : 1 + width], values[1 + width :]
         sums = [code.zero] * (4 * width)
         for m in range(1, n):
             at = width * (m % 4)

@@ -1,6 +1,6 @@
 """Double-double arithmetic in machine code: a number is the exact sum of two doubles, high and low, 106 bits.
 
-Sums and products leave the low word a few units of the high one wide; ``quick_two_sum`` brings a result to order.
+After sums and products the low word may be a few units of the high one; ``quick_two_sum`` normalises a result.
 Logarithms are taken from the bits of the exponent and a cubic: + - × only, the same on every processor.
 """
 
@@ -39,14 +39,14 @@ def multiply(code: Code, a: Pair, b: Pair) -> Pair:
 def by_constant(code: Code, constant: Constant, a: Pair) -> Pair:
     """A constant in three words times a.
 
-    What two words of a simple fraction such as 5/6 leave out does not average out: over 10^6 steps it adds up.  Nor do
-    the roundings, if the high word is that of the first word of the constant only: its few remainders then are not as
-    often below 0 as above.  So the high word is that of the whole product.
+    The error of two words of a simple fraction such as 5/6 does not average out: it accumulates over 10^6 steps.  Nor
+    do the roundings, if the high word is the product of the first word of the constant only, as its few remainders are
+    biased.  So the high word is that of the whole product.
     """
-    rest = code.fma(constant[1], a[0], constant[2] * a[0])
-    product = code.fma(constant[0], a[0], rest)
+    low = code.fma(constant[1], a[0], constant[2] * a[0])
+    product = code.fma(constant[0], a[0], low)
     error = code.fma(constant[0], a[0], -product)
-    return product, code.fma(constant[0], a[1], error + rest)
+    return product, code.fma(constant[0], a[1], error + low)
 
 
 def times(code: Code, a: Pair, factor: Operand) -> Pair:
@@ -56,91 +56,91 @@ def times(code: Code, a: Pair, factor: Operand) -> Pair:
 
 
 def accumulated(code: Code, total: Pair, a: Pair, b: Pair) -> Pair:
-    """total + a b, its low word unordered: for long sums."""
+    """total + a b for long sums, with its low word not normalised."""
     high = total[0] + a[0] * b[0]
     part = high - total[0]
-    rest = total[0] - (high - part)
+    error = total[0] - (high - part)
     # the rounding of the product too
     low = code.fma(a[0], b[1], code.fma(a[1], b[0], code.fma(a[0], b[0], -part)))
-    return high, total[1] + (rest + low)
+    return high, total[1] + (error + low)
 
 
 def divided(code: Code, a: Pair, divisor: Operand, inverse: Pair) -> Pair:
     """a over an integer whose inverse is given in two words.
 
-    A product with the inverse would be wrong in the same way at every step, which adds up where roundings average out;
-    the quotient of the exact remainder is not.
+    A product with the inverse has the same error at every step, which accumulates where roundings average out; the
+    quotient of the exact remainder has not.
     """
     high = a[0] * inverse[0]
-    rest = code.fma(-high, divisor, a[0]) + a[1]
-    return high, code.fma(rest, inverse[0], rest * inverse[1])
+    remainder = code.fma(-high, divisor, a[0]) + a[1]
+    return high, code.fma(remainder, inverse[0], remainder * inverse[1])
 
 
 def later(code: Code, time: Pair, length: Operand) -> Pair:
-    """time + length, in order."""
+    """time + length, normalised."""
     total, error = code.two_sum(time[0], length)
     return code.quick_two_sum(total, error + time[1])
 
 
 def covered(time: Pair, target: Pair) -> Operand:
-    """Whether time is the target or behind it."""
+    """Whether time has reached the target."""
     level = (time[0] == target[0]) & (time[1] >= target[1])
     return (time[0] > target[0]) | level
 
 
 def behind(code: Code, time: Pair, began: Pair, sign: Operand) -> tuple[Pair, Operand]:
-    """± (time − began), doubles in order, and a bit: whether it surely is what :func:`split` makes of the exact one.
+    """± (time − began), normalised, and a bit: whether it is certainly the pair of :func:`split` of the exact number.
 
     The exact difference is s + l + e, where s is the nearest double to s + l, with more to spare than |e| or e = 0.
     """
     first, error = code.two_sum(time[0], -began[0])
-    second, rest = code.two_sum(time[1], -began[1])
+    second, low_error = code.two_sum(time[1], -began[1])
     total, low = code.two_sum(first, second)
-    low, one = code.two_sum(low, error)
-    low, other = code.two_sum(low, rest)
+    low, error1 = code.two_sum(low, error)
+    low, error2 = code.two_sum(low, low_error)
     high, low = code.two_sum(total, low)
-    one_is, other_is = one == 0, other == 0
-    low, _ = code.two_sum(low, one + other)
+    exact1, exact2 = error1 == 0, error2 == 0
+    low, _ = code.two_sum(low, error1 + error2)
     wider = low * (1 + 2.0**-40)
     nearest = high + wider == high
-    sure = (one_is & other_is) | ((one_is | other_is) & nearest)
+    sure = (exact1 & exact2) | ((exact1 | exact2) & nearest)
     return (high * sign, low * sign), sure
 
 
 def polynomials(
-    code: Code, orders: Pair, places: Sequence[Pair], count: int, row: Callable[[Operand], list[Pair]]
+    code: Code, orders: Pair, points: Sequence[Pair], count: int, row: Callable[[Operand], list[Pair]]
 ) -> list[list[Operand]]:
-    """For each place, the words of Σ row(n) place^n for each of the ``count`` numbers of a row, from the highest order.
+    """The words of Σ row(n) x^n at each place x, for each of the ``count`` numbers of a row, from the highest order.
 
-    orders: the last of those in double-double, and the highest; between them it goes on in plain doubles.
-    The sums of one place wait for each other, those of several do not.
+    orders: the last one in double-double, and the highest; those between are in plain doubles.
+    The sums of one place depend on each other, those of several do not.
     """
     low_order, order = orders
 
     def plain(k: Operand, sums: list[Operand]) -> list[Operand]:
         highs = [high for high, _ in row(order - k)]
-        both = [(at, high) for at, _ in places for high in highs]
-        return [code.fma(total, at, high) for total, (at, high) in zip(sums, both, strict=True)]
+        factors = [(at, high) for at, _ in points for high in highs]
+        return [code.fma(total, at, high) for total, (at, high) in zip(sums, factors, strict=True)]
 
     def term(k: Operand, words: list[Operand]) -> list[Operand]:
         result: list[Operand] = []
         coefficients = row(low_order - k)
-        for at in places:
+        for at in points:
             for coefficient in coefficients:
                 total = multiply(code, (words[len(result)], words[len(result) + 1]), at)
                 result += code.quick_two_sum(*add(code, total, coefficient))
         return result
 
-    sums = code.loop(0, order - low_order, plain, [code.zero] * (count * len(places)))
+    sums = code.loop(0, order - low_order, plain, [code.zero] * (count * len(points)))
     begin = [word for total in sums for word in (total, code.zero)]
     words, width = code.loop(0, low_order + 1, term, begin), 2 * count
-    return [words[width * i : width * (i + 1)] for i in range(len(places))]
+    return [words[width * i : width * (i + 1)] for i in range(len(points))]
 
 
 def step_length(code: Code, radii: Sequence[Operand], reach: Operand) -> Operand:
-    """h, from log2 of the radius of convergence as the last two coefficients have it; in a few bits."""
-    least = code.smaller(radii[0], radii[1])
-    return power_of_two(code, least + reach, _LARGEST_STEP, _STEP_BITS)
+    """h to few bits, from log2 of the radius of convergence by the last two coefficients."""
+    smallest = code.smaller(radii[0], radii[1])
+    return power_of_two(code, smallest + reach, _LARGEST_STEP, _STEP_BITS)
 
 
 def split(value: Fraction) -> tuple[float, float]:
@@ -156,7 +156,7 @@ def split_ratio(top: int, bottom: int) -> tuple[float, float]:
 
 
 def split_constant(value: Fraction) -> tuple[float, float, float]:
-    """The three doubles nearest to ``value``, as :func:`by_constant` takes them."""
+    """The three doubles nearest to ``value``, for :func:`by_constant`."""
     return _split_ratio(*value.as_integer_ratio())
 
 
@@ -182,10 +182,10 @@ def power_of_two(code: Code, exponent: Operand, most: int, bits: int) -> Operand
     integral = (bounded - _LEAST_EXPONENT).to_integer()
     fraction = bounded - _LEAST_EXPONENT - integral.to_double()
     significand = (1.0 + _bent(fraction, _POWER)).bits()
-    kept = ((1 << _FRACTION_BITS) - 1) ^ ((1 << (_FRACTION_BITS + 1 - bits)) - 1)
+    mask = ((1 << _FRACTION_BITS) - 1) ^ ((1 << (_FRACTION_BITS + 1 - bits)) - 1)
     biased = integral + (_BIAS + int(_LEAST_EXPONENT))
     shifted = biased << _FRACTION_BITS
-    return ((significand & kept) + shifted).of_bits()
+    return ((significand & mask) + shifted).of_bits()
 
 
 def _bent(fraction: Operand, bend: tuple[float, ...]) -> Operand:

@@ -1,4 +1,4 @@
-"""One motion in double-double: what the machine code of :mod:`heavytop.multiword.double_double.steps` works on."""
+"""One motion in double-double: the data of the machine code of :mod:`heavytop.multiword.double_double.steps`."""
 
 from __future__ import annotations
 
@@ -47,26 +47,26 @@ _DOUBLE_BITS = 53
 _ROUNDING_BITS = 4
 _LEAST_ROOM, _LEAST_DEPTH = -66.0, -112.0
 _SPLIT_BITS = 32
-"""How far the rounding of S_n lies below the product of its two units (measured)."""
+"""Bits by which the rounding error of S_n is below the product of its two units (measured)."""
 _USUAL_UNITS = -34.0
 """log2 of the product of two units where the state is about 1."""
 _NEVER = -1000.0
 LARGEST_TIME = Fraction(2) ** 1000
 SMALLEST_TIME = 1 / LARGEST_TIME
-"""A target that is nearer would be 0 in two doubles, and no step is taken to 0."""
+"""The least target: a smaller one would be 0 in two doubles, and no step would be taken."""
 _STEPS_AT_ONCE, _SAMPLES_AT_ONCE = 1024, 2048
-"""Words of so many samples fit into a near cache; memory that is new to the process takes longer than they do."""
+"""Steps and samples of a call: the words of so many samples fit into a cache near the processor."""
 PLACES = (*range(6), *range(19, 22))
-"""Where the first words of Ω, γ and ξ stand; the second are 8 behind."""
+"""Offsets of the first words of Ω, γ and ξ; the second follow 8 doubles later."""
 
 
 @dataclass(frozen=True, slots=True)
 class OrderSchedule:
-    """How far the series goes, how long a step is, and what is kept in double-double.
+    """The order of the series, the length of a step, and the orders kept in double-double.
 
     order: N.  reach: log2 of h/ρ.  room: log2 of the largest |y_n| h^n / |y_0| whose rounding to a double is allowed,
     at n0 + 1.  depth: log2 of what the products of two units h^n may be beside |y_0|, at the first n whose coefficients
-    are split; none are where it is very small.
+    are split; none are split where it is very small.
     """
 
     order: int
@@ -77,27 +77,26 @@ class OrderSchedule:
     @classmethod
     @lru_cache(maxsize=256)
     def of(cls, tolerance: Fraction, fall: float = FALL_ALONE) -> OrderSchedule:
-        """For a local error of ``tolerance`` relative to the state.
+        """The schedule for a local error of ``tolerance`` relative to the state.
 
-        fall: of the logarithm of y_n h^n from one order to the next.  2 is best where the time goes into N² products
-        (Jorba and Zou); a single motion waits for the last product of each order, so that many orders and long steps
+        fall: of the logarithm of y_n h^n from one order to the next.  2 is best where N² products dominate the time
+        (Jorba and Zou); a single motion waits for the last product of each order, so that high orders and long steps
         are faster.
         """
         log_tolerance = math.log(tolerance.numerator) - math.log(tolerance.denominator)
-        # what is left out errs in the same way at every step: it shall not show beside roundings after 10^7 steps
+        # the truncation error has the same sign at every step: it must be below rounding noise after 10^7 steps
         finest = tolerance <= Fraction(1, 2 ** (BITS - 1))
         depth = _DEEPEST if finest else _MARGIN - log_tolerance
         order = min(math.ceil(depth / fall), MOST_ORDER - 2)
         reach = -(depth / order + 0.7 / (order - 1)) / math.log(2)
         room = max(_DOUBLE_BITS - depth / math.log(2) - _ROUNDING_BITS, _LEAST_ROOM)
-        # roundings of split coefficients average out: the finest may show 2^6 times less than double-double's
+        # roundings of split coefficients average out: the finest may be 2^6 times below those of double-double
         return cls(order, reach, room, max(room - _DOUBLE_BITS, _LEAST_DEPTH) + _SPLIT_BITS)
 
     def pair_order(self, low_order: int) -> int:
-        """The first order that is split in eight motions whose n0 is the same.
+        """The first order that is split in eight motions with the same n0.
 
-        It is that of coefficients which fall as those of a motion near a singularity, and rises with n0; with the
-        largest n0 none are split.
+        It suits coefficients that fall as near a singularity, and rises with n0; with the largest n0 none are split.
         """
         if low_order >= self.order - 1:
             return low_order
@@ -113,7 +112,7 @@ machine = once(dd.build)
 class Floating(ResumableRun):
     """A motion that advances in double-double steps.
 
-    low_order: n0 of the first step; None for the largest, from which it falls to what the motion needs.
+    low_order: n0 of the first step; None for the largest, from which it falls.
     """
 
     def __init__(
@@ -180,25 +179,26 @@ class Floating(ResumableRun):
 
     @property
     def status(self) -> Status:
-        """How the last advance ended."""
+        """The outcome of the last advance."""
         return Status(int(self.counts[dd.STATUS]))
 
     def sampled(self, highs: Doubles, lows: Doubles) -> Iterator[Doubles]:
-        """Steps until the last of the times |τ| > 0, in order, in two words; the words of the states that are reached,
-        a row each, of many at a time, which the next overwrite: the bits of :meth:`advance` and :meth:`sample` one by
-        one.
+        """Steps up to the last of the times |τ| > 0, ascending, in two words.
+
+        Yields the words of states, a row each, many at a time, which the next chunk overwrites: the bits of single
+        calls of :meth:`advance` and :meth:`sample`.
         """
         row, progress = 16 * self.layout.vectors, numpy.zeros(2, numpy.int64)
         samples = doubles(row * (min(len(highs), _SAMPLES_AT_ONCE) + dd.AT_ONCE))
-        own = [pointer(array) for array in (self.words, self.clock, self.counts, self.table, self.scratch)]
+        arrays_of_motion = [pointer(array) for array in (self.words, self.clock, self.counts, self.table, self.scratch)]
         for first in range(0, len(highs), _SAMPLES_AT_ONCE):
             times = [words[first : first + _SAMPLES_AT_ONCE] for words in (highs, lows)]
-            arrays, count = [*own, *map(pointer, times), pointer(progress)], len(times[0])
+            arrays, count = [*arrays_of_motion, *map(pointer, times), pointer(progress)], len(times[0])
             progress[:] = 0
             while progress[0] < count and self.status is Status.OK:
                 done, taken = progress
                 self.machine.functions["follow"](*arrays, count, taken + _STEPS_AT_ONCE, pointer(samples))
-                if self.status is Status.OK and tuple(progress) == (done, taken):  # a time that takes exact numbers
+                if self.status is Status.OK and tuple(progress) == (done, taken):  # a time that needs exact numbers
                     time = Fraction(times[0][done]) + Fraction(times[1][done])
                     samples[row * done : row * (done + 1)] = self.words_at(time)
                     progress[0] += 1
@@ -208,7 +208,7 @@ class Floating(ResumableRun):
                 return
 
     def derivatives(self, n: int) -> tuple[Fraction, ...]:
-        """y_n of the last step, exactly as it was computed; a step back in time has a negative length."""
+        """y_n of the last step, as the exact values of its words; a step back in time has a negative length."""
         return _exact_state(self._row(n), len(self.problem.state))
 
     @property
@@ -270,14 +270,14 @@ def _after(order: int) -> Doubles:
     return numpy.array([(n, *split(Fraction(1, n))) for n in range(1, order + 1)])
 
 
-# The Taylor recurrence of eight motions side by side, a lane each: in double-double, split, and in plain doubles.
+# The Taylor recurrence of eight motions, a lane each: in double-double, split, and in plain doubles.
 
 
 ROW = 6 * LANES
 """Doubles of one order in each of four tables."""
 LOW, COARSE, OK, SCRATCH = (k * ROW * MOST_ORDER for k in range(1, 5))
-"""Where the tables of low words and of the two parts of split coefficients begin, behind that of high words; low words
-of orders above n0 are 0 from the beginning.  Apart from each other, what an order needs fits into the nearest cache."""
+"""Offsets of the tables of low words and of the two parts of split coefficients, after that of high words; low words of
+orders above n0 are 0 from the beginning.  In separate tables the data of an order fit into the nearest cache."""
 
 Products = Sequence[tuple[int, int, int, int]]
 # (left, right, component of the sum, sign): Ω × Ω without its coefficients, and γ × Ω
@@ -307,7 +307,7 @@ class LaneOrders:
         self.code, self.units = code, units
         self.coefficients, self.quotients, self.scratch = arrays
         self.terms = [(k, component, source) for k, (_, component, source) in enumerate(terms(system), 3)]
-        # where a coefficient is 0 in every lane, a bit
+        # whether a coefficient is 0 in every lane, a bit
         self.absent = {k: self.code.all_of(self._coefficient(k)[0] == 0) for k in (2, *(k for k, *_ in self.terms))}
 
     def write(self, pair_order: Operand, low_order: Operand, order: Operand) -> tuple[Operand, list[Operand]]:
@@ -323,7 +323,7 @@ class LaneOrders:
         return splitting, peaks
 
     def row(self, n: Index) -> Operand:
-        """Where the row of order n begins."""
+        """The address of the row of order n."""
         return self.code.address(self.scratch, self.code.integer(n) * ROW)
 
     def pair(self, row: Operand, i: int) -> Pair:
@@ -339,7 +339,7 @@ class LaneOrders:
         return high, middle, low
 
     def _sums(self, group: Products, sums: Callable[[Products], list[Operand]]) -> list[Operand]:
-        """``sums`` of a group of products; those of Ω3 are zeros, not computed, where all tops have I1 = I2."""
+        """``sums`` of a group of products; those of Ω3 are zeros, without computation, where all tops have I1 = I2."""
         if group is not _OMEGA:
             return sums(group)
 
@@ -358,7 +358,7 @@ class LaneOrders:
     def _pair_order(self, n: Operand, _: list[Operand]) -> None:
         """y_(n+1) in double-double."""
         code = self.code
-        y, following, quotient = self.row(n), self.row(n + 1), self._quotient(n)
+        y, next_row, quotient = self.row(n), self.row(n + 1), self._quotient(n)
         after = code.spread((n + 1).to_double())
         for rows, group in _GROUPS:
             words = self._sums(group, partial(self._pair_sums, n))
@@ -370,7 +370,7 @@ class LaneOrders:
                     if component == i:
                         total = self._with_term(k, total, self.pair(y, source))
                 high, low = code.quick_two_sum(*divided(code, total, after, quotient))
-                self._put(following, i, (high, low))
+                self._put(next_row, i, (high, low))
 
     def _with_term(self, k: int, total: Pair, y: Pair) -> Pair:
         def added() -> list[Operand]:
@@ -399,7 +399,7 @@ class LaneOrders:
         return products
 
     def _split_row(self, m: Operand, peaks: list[Operand]) -> list[Operand]:
-        """Split y_m; the largest |y_m| 2^(e_0 - e_m) of Ω and of γ, this one with it."""
+        """Split y_m; returns the largest |y_m| 2^(e_0 - e_m) of Ω and of γ so far."""
         row = self.row(m)
         return self._put_parts(m, [self.pair(row, i) for i in range(6)], peaks)
 
@@ -418,7 +418,7 @@ class LaneOrders:
 
     def _split_order(self, n: Operand, peaks: list[Operand]) -> list[Operand]:
         """y_(n+1) from split coefficients."""
-        y, following = self.row(n), self.row(n + 1)
+        y, next_row = self.row(n), self.row(n + 1)
         divisor = self.code.spread((n + 1).to_double()), self._quotient(n)[0]
         halves = []
         for rows, group in _GROUPS:
@@ -431,7 +431,7 @@ class LaneOrders:
                     if component == i:
                         factors.append((self._coefficient(k), self.pair(y, source)))
                 pair = quotient(self.code, None if i < 3 else total, factors, divisor)
-                self._put(following, i, pair)
+                self._put(next_row, i, pair)
                 halves.append(pair)
         return self._put_parts(n + 1, halves, peaks)
 
@@ -443,14 +443,14 @@ class LaneOrders:
         code, left, right = self.code, self.row(m), self.row(n - m)
         result = list(sums)
         for first, second, component, sign in group:
-            a, rest = (code.load(left, part + LANES * first) for part in (COARSE, OK))
+            a, fine_left = (code.load(left, part + LANES * first) for part in (COARSE, OK))
             coarse, fine = (code.load(right, part + LANES * second) for part in (COARSE, OK))
             if sign < 0:
-                a, rest = -a, -rest
+                a, fine_left = -a, -fine_left
             at = 3 * (component % 3)
             unsplit = code.load(right, LANES * second)
-            for k, (one, factor) in enumerate(((a, coarse), (a, fine), (rest, unsplit))):
-                result[at + k] = code.fma(one, factor, result[at + k])
+            for k, (left_part, factor) in enumerate(((a, coarse), (a, fine), (fine_left, unsplit))):
+                result[at + k] = code.fma(left_part, factor, result[at + k])
         return result
 
     def _plain_orders(self, start: Operand, stop: Operand, omega: Products) -> list[Operand]:
@@ -478,10 +478,10 @@ class LaneOrders:
     def _plain_rates(self, n: Operand, sums: list[Operand]) -> None:
         """y_(n+1) from its sums."""
         code = self.code
-        y, following, quotient = self.row(n), self.row(n + 1), self._quotient(n)[0]
+        y, next_row, quotient = self.row(n), self.row(n + 1), self._quotient(n)[0]
         for i, products in enumerate(sums):
             total = self._coefficient(i)[0] * products if i < 3 else products
             for k, component, source in self.terms:
                 if component == i:
                     total = code.fma(self._coefficient(k)[0], code.load(y, LANES * source), total)
-            code.store(total * quotient, following, LANES * i)
+            code.store(total * quotient, next_row, LANES * i)

@@ -1,4 +1,4 @@
-"""Eight motions in double-double: the machine code, and the numbers that it works on."""
+"""Eight motions in double-double: the machine code and its data."""
 
 from __future__ import annotations
 
@@ -63,12 +63,11 @@ from heavytop.multiword.double_double.steps import (
 from heavytop.multiword.problem import Scaled, Status, Steps
 from heavytop.top.equations import System
 
-# Eight motions side by side, a lane each, in double-double with plain doubles above an order n0.
+# Eight motions, a lane each, in double-double with plain doubles above an order n0.
 #
-# Each lane has its own time, step and target, and its bits do not depend on the others: N and n0 are the same for all
-# and do not change.  A lane whose next step would cover its target waits; the scratch then holds the polynomial of that
-# step. A lane that would need a larger n0 stops and says so.  One whose units of split coefficients did not fit tries
-# again.
+# Each lane has its own time, step and target, and its bits do not depend on the others: N and n0 are common and
+# constant. A lane whose next step would cover its target waits; the scratch then holds the polynomial of that step.  A
+# lane that needs a larger n0 stops with a flag.  One whose units of split coefficients do not fit repeats the step.
 
 
 OK, NON_FINITE, TOO_SMALL, LARGER_N0 = 0, 1, 2, 4
@@ -82,9 +81,10 @@ _TOLERATED = 1.0
 def build(system: System, processor: Processor | None = None) -> Machine:
     """``advance`` and ``sample`` of eight motions.
 
-    advance(state, clock, flags, order, low_order, pair_order, coefficients, quotients, scratch, steps): as many rounds
-    of steps at most, until no lane can go; gives the number of rounds.  Orders from pair_order to low_order are split.
-    sample(scratch, order, times, result): each lane's polynomial at its own time, in two words, behind its beginning.
+    advance(state, clock, flags, order, low_order, pair_order, coefficients, quotients, scratch, steps): at most so many
+    rounds of steps, until no lane can advance; returns the number of rounds.  Orders from pair_order to low_order are
+    split. sample(scratch, order, times, result): each lane's polynomial at its own time, in two words, behind its
+    beginning.
     """
     module = ir.Module("lanes")
     _Round(module, system).write()
@@ -172,24 +172,24 @@ class _Round:
         return [code.quick_two_sum(words[2 * i], words[2 * i + 1]) for i in range(6)]
 
     def _finish(self, peaks: list[Operand], splitting: Operand) -> Operand:
-        """Move the lanes that can go; whether any did, or has to try again."""
+        """Advance the lanes that can; returns whether any advanced or repeats its step."""
         code = self.code
         start = self._norm(code.integer(0))
         length = self._length(start)
         step = length * self._clock(SIGN)
         results = self._sums(step)
         time, low = (code.load(self.clock, 8 * (TIME + k)) for k in range(2))
-        total, rest = later(code, (time, low), length)
+        total, total_low = later(code, (time, low), length)
         target, target_low = (code.load(self.clock, 8 * (TARGET + k)) for k in range(2))
-        behind = covered((total, rest), (target, target_low))
+        behind = covered((total, total_low), (target, target_low))
         fits, tried_out = self._fits(peaks, splitting, start, length)
         flags = self._judged(start, length, results, total > time, tried_out)
-        fine, left = flags == 0, self._clock(LEFT)
-        alive = fine & (left > 0)
+        fine, steps_left = flags == 0, self._clock(LEFT)
+        alive = fine & (steps_left > 0)
         going, again = alive & (fits & ~behind), alive & ~fits
         old = [(self.state, ROW * word + 8 * i, results[i][word]) for i in range(6) for word in range(2)]
-        old += [(self.clock, 8 * TIME, total), (self.clock, 8 * (TIME + 1), rest)]
-        old += [(self.clock, 8 * LEFT, left - 1)]
+        old += [(self.clock, 8 * TIME, total), (self.clock, 8 * (TIME + 1), total_low)]
+        old += [(self.clock, 8 * LEFT, steps_left - 1)]
         for base, offset, value in old:
             code.store(code.select(going, value, code.load(base, offset)), base, offset)
         self._follow(peaks, length, going, again)
@@ -198,15 +198,15 @@ class _Round:
     def _fits(
         self, peaks: list[Operand], splitting: Operand, start: Operand, length: Operand
     ) -> tuple[Operand, Operand]:
-        """Lanes whose split coefficients were exact enough, and those that were tried often enough."""
+        """Lanes with accurate split coefficients, and those with the largest number of tries."""
         code = self.code
         units = [self._clock(UNITS + k) for k in range(2)]
         slope = self._clock(SLOPE)
         fits = (slope - self._slope(length) < TOLERATED_SLOPE) & (code.absolute(slope) <= STEEPEST)
         for unit, peak in zip(units, peaks, strict=True):
             fits &= in_range(unit) & next_unit(code, unit, peak)[0]
-        both = log2(units[0]) + log2(code.larger(*units))
-        above = both - 2 * LOG2_OF_A_UNIT + (log2(length) - start)
+        product_log = log2(units[0]) + log2(code.larger(*units))
+        above = product_log - 2 * LOG2_OF_A_UNIT + (log2(length) - start)
         fall = -SLACK - self._clock(REACH)
         most = code.spread(self.pair_order.to_double()) * fall
         fits = code.select(splitting, fits & (above - self._clock(DEPTH) <= most), True)
@@ -217,7 +217,7 @@ class _Round:
         return self._clock(REACH) - log2(length) + SLACK
 
     def _follow(self, peaks: list[Operand], length: Operand, going: Operand, again: Operand) -> None:
-        """Units for the next step; a lane that waits keeps its own, so that its series stays what it is."""
+        """Store the units of the next step; a waiting lane keeps its own, so that its series does not change."""
         code = self.code
         either = going | again
         tries = code.select(again, self._clock(TRIES) + 1, code.zero)
@@ -226,7 +226,7 @@ class _Round:
             code.store(code.select(either, value, self._clock(offset)), self.clock, 8 * offset)
 
     def _judged(self, start: Operand, length: Operand, results: list[Pair], moves: Operand, tried: Operand) -> Operand:
-        """The flags of all lanes, with those that this step sets; a lane without steps left gets none."""
+        """The flags of all lanes with those of this step; a lane without steps left gets none."""
         code, b = self.code, self.code.builder
         above = self.low_order + 1
         power = code.spread(above.to_double()) * log2(length)
@@ -238,11 +238,11 @@ class _Round:
             return code.select(condition, value, 0)
 
         flags = b.bitcast(self.flags, INT_VECTOR.as_pointer())
-        known = code.value(b.load(flags, align=8))
+        flags_before = code.value(b.load(flags, align=8))
         status = flag(~finite, NON_FINITE) | flag(~moves, TOO_SMALL)
         status |= flag((rounding > limit) | tried, LARGER_N0)
         alive = self._clock(LEFT) > 0
-        status = known | code.select(alive, status, 0)
+        status = flags_before | code.select(alive, status, 0)
         b.store(status, flags, align=8)
         return status
 
@@ -258,7 +258,7 @@ machine = once(build)
 class Eight:
     """Eight lanes of motions of one system, each idle or with a motion in it.
 
-    low_order: n0, the same for all, 2 at least; a motion that needs a larger one stops.
+    low_order: n0 of all lanes, at least 2; a motion that needs a larger one stops.
     """
 
     def __init__(
@@ -281,14 +281,14 @@ class Eight:
         self.clock[[ROOM, REACH, DEPTH]] = [[schedule.room], [schedule.reach], [schedule.depth]]
 
     def put(self, lane: int, problem: Scaled, forwards: bool, most: int | None) -> None:
-        """A motion at its beginning; most: the steps that it may take."""
+        """Put a motion at its start into a lane; most: the largest number of steps."""
         rows = problem.coefficients.vectors[0]
         sources = [*rows[0][:3], *(rows[row][component] for row, component, _ in self.terms)]
         words = numpy.transpose([split(value) for value in problem.state]).ravel()
         self.begin(lane, words, numpy.array([split_constant(value) for value in sources]), forwards, most)
 
     def begin(self, lanes: Any, words: Any, constants: Any, forwards: bool, most: int | None) -> None:
-        """Motions at their beginning in a lane, or in all: the words of their states, and of each constant."""
+        """Put motions at their start into a lane, or into all: the words of their states and of each constant."""
         self.words[:, lanes], self.constants[:, :, lanes], self.flags[lanes] = words, constants, OK
         self.clock[[TIME, TIME + 1, SLOPE, TRIES], lanes] = 0.0
         self.clock[[UNITS, UNITS + 1], lanes] = FIRST_UNITS
@@ -296,7 +296,7 @@ class Eight:
         self.clock[LEFT, lanes] = _NO_LIMIT if most is None else most
 
     def reach_all(self, targets: Any) -> Doubles:
-        """The states of eight motions forwards at doubles |τ|, each at its own, not before the last: (12, 8)."""
+        """The states of eight motions, forwards in time, at one double |τ| each, not before the last: shape (12, 8)."""
         self.clock[TARGET] = targets
         while self.advance(_ROUNDS) == _ROUNDS:
             pass
@@ -308,44 +308,44 @@ class Eight:
         return self._sample()
 
     def _sample(self) -> Doubles:
-        """The states of all lanes so far behind the beginnings of their next steps."""
+        """The states of all lanes at the set distances from the beginnings of their next steps."""
         self.functions["sample"](self.tables[2], self.schedule.order, *self.sampling)
         return self.sampled
 
     def taken_out(self, lane: int) -> tuple[Doubles, Doubles]:
-        """All that a motion needs to go on in another eight: its state, and its part of the clock."""
+        """The state and the clock of a motion, sufficient to continue it in another eight."""
         return self.words[:, lane].copy(), self.clock[:, lane].copy()
 
     def put_back(self, lane: int, problem: Scaled, forwards: bool, moved: tuple[Doubles, Doubles]) -> None:
-        """A motion that was taken out of another eight."""
+        """Put a motion from another eight into a lane."""
         self.put(lane, problem, forwards, None)
         self.words[:, lane], self.clock[:, lane] = moved
         self.clock[TRIES, lane] = 0.0
 
     def empty(self, lane: int) -> None:
-        """Nothing in this lane: it takes no steps."""
+        """Empty this lane: it takes no steps."""
         self.clock[LEFT, lane] = 0.0
 
     def aim(self, lane: int, target: Fraction) -> None:
-        """Where this lane is to stop, |τ|."""
+        """Set the target |τ| of a lane."""
         self.clock[TARGET : TARGET + 2, lane] = split(min(target, LARGEST_TIME))
 
     def advance(self, rounds: int) -> int:
-        """Steps of all lanes that can go, at most so many; gives the rounds after which none could."""
+        """Advance all lanes that can by at most ``rounds`` steps; returns the number of rounds taken."""
         orders = self.schedule.order, self.low_order, self.pair_order
         taken: int = self.functions["advance"](*self.moving, *orders, *self.tables, rounds)
         return taken
 
     def time(self, lane: int) -> Fraction:
-        """|τ| of the last step end of a lane."""
+        """|τ| at the end of the last step of a lane."""
         return Fraction(self.clock[TIME, lane]) + Fraction(self.clock[TIME + 1, lane])
 
     def taken(self, lane: int, most: int | None) -> int:
-        """Steps of the motion in a lane, which might take ``most``."""
+        """Steps taken by the motion in a lane, of at most ``most``."""
         return int((_NO_LIMIT if most is None else most) - self.clock[LEFT, lane])
 
     def status(self, lane: int) -> Status | None:
-        """Whether the motion in a lane can go on; None where it needs a larger n0."""
+        """The status of the motion in a lane; None where it needs a larger n0."""
         flags = int(self.flags[lane])
         if flags & NON_FINITE:
             return Status.NON_FINITE
@@ -359,11 +359,11 @@ class Eight:
         return exact_state(numpy.concatenate(words))
 
     def state(self, lane: int) -> tuple[Fraction, ...]:
-        """Where a lane's motion is."""
+        """The state of the motion in a lane."""
         return exact_state(self.words[:, lane])
 
     def samples(self, times: dict[int, Fraction]) -> dict[int, Doubles]:
-        """The states of some lanes, each at a time |τ| inside its next step: high words, then low ones, shape (12,)."""
+        """The states of some lanes at times |τ| inside their next steps: high words, then low ones, shape (12,)."""
         for lane, time in times.items():
             self.behind[:, lane] = self._behind(lane, time)
         samples = self._sample()

@@ -1,9 +1,9 @@
 """Taylor steps in double-double arithmetic (106 bits), with fewer bits from some order on.
 
-The coefficients y_n of a motion fall with n.  From some order on split coefficients are exact enough, and the low words
-of all above some n0 < N are too small to matter: there the recurrence goes on in plain doubles.  n0 follows the motion:
-a step is done again with a larger one where 2^-53 |y_(n0+1)| h^(n0+1) comes out above what is allowed, and n0 falls
-where a smaller one would do.
+The coefficients y_n of a motion fall with n.  From some order on split coefficients are accurate enough, and the low
+words above some n0 < N are negligible: there the recurrence uses plain doubles.  n0 adapts to the motion: a step is
+repeated with a larger one where 2^-53 |y_(n0+1)| h^(n0+1) exceeds its bound, and n0 falls where a smaller one suffices.
+
 
 The step is h = ρ exp(reach), with the radius ρ from the last two coefficients as Jorba and Zou have it (Exp. Math. 14
 (2005) 99); its significand is cut to ten bits, so that h^4 is a double and h adds to the time exactly.
@@ -47,7 +47,7 @@ from heavytop.multiword.double_double.arithmetic import (
 )
 from heavytop.top.equations import System
 
-# Taylor orders between those in double-double and those in plain doubles: coefficients split in two.
+# Taylor orders between double-double and plain doubles: coefficients split in two.
 #
 # y_m = a + b, where a is a multiple of a unit 2^e_m and |y_m| <= 2^21 units, and b a double of half a unit at most.
 # But for its rounding e_m is linear in m, so that the products of series that make S_n have a common unit: products and
@@ -55,11 +55,11 @@ from heavytop.top.equations import System
 #
 #     S_n = Σ a_m a_(n−m) + Σ (a_m b_(n−m) + b_m R_(n−m)),
 #
-# three operations a product instead of the ten of double-double.  The error is some 2^-72 of the largest products:
-# enough where y_n h^n lies as far below the state as that is above what is asked.
+# three operations a product instead of the ten of double-double.  The error is some 2^-72 of the largest products,
+# which suffices where y_n h^n is small enough beside the state.
 #
-# The units follow the motion from step to step.  A step whose coefficients exceed them, or use few bits of them only,
-# is done again with others.
+# The units adapt to the motion from step to step.  A step whose coefficients exceed them, or use few bits of them, is
+# repeated with others.
 
 
 UNIT_BITS = 21
@@ -70,7 +70,7 @@ SLOPE_BITS = 16
 _MOST_UNIT_BITS, STEEPEST = 400, 8
 """|e_0| and |slope| at most."""
 _SPARSE, _ROOM = 2.0**-6, 8.0
-"""The part of 2^21 units that a step uses at least; the next has between four and eight times what this one needed."""
+"""The least share of 2^21 units in use; the next units have room for four to eight times the largest coefficient."""
 SLACK, TOLERATED_SLOPE = 0.25, 0.375
 """Excess of the slope over log2 of the inverse radius, and what it may have too much beside that."""
 MOST_TRIES = 3
@@ -85,7 +85,7 @@ _ROUND = ([1, 2, 0, 4, 5, 3, 6, 7], [2, 0, 1, 5, 3, 4, 6, 7])
 
 
 def splits(code: Code, units: list[Operand], slope: Operand) -> Operand:
-    """Whether there are such units, a bit; units: 1.5 · 2^52 of them, lane by lane."""
+    """Whether the units are in range, a bit; units: 1.5 · 2^52 of them, lane by lane."""
     steepest = STEEPEST << SLOPE_BITS
     splits = code.unsigned_less(slope + steepest, 2 * steepest)
     for unit in units:
@@ -100,7 +100,7 @@ def in_range(unit: Operand) -> Operand:
 
 
 def next_unit(code: Code, unit: Operand, peak: Operand) -> tuple[Operand, Operand]:
-    """Whether the units of a step were good, and those of the next, lane by lane.
+    """Whether the units of a step fit, and the units of the next, lane by lane.
 
     unit: 1.5 · 2^52 of them.  peak: the largest |y_m| 2^(e_0 - e_m).
     """
@@ -118,8 +118,8 @@ def rises(code: Code, m: Operand, slope: Operand) -> Pair:
     """2^(e_m - e_0) and its inverse, lane by lane, for slopes that are doubles."""
     rounded = code.fma(code.spread(m.to_double()), slope, 1.5 * 2.0**_FRACTION_BITS)
     shift = rounded.bits() << _FRACTION_BITS
-    one = _BIAS << _FRACTION_BITS
-    return (one + shift).of_bits(), (one - shift).of_bits()
+    unit_bits = _BIAS << _FRACTION_BITS
+    return (unit_bits + shift).of_bits(), (unit_bits - shift).of_bits()
 
 
 def parts(y: Pair, big: Operand) -> Pair:
@@ -129,28 +129,28 @@ def parts(y: Pair, big: Operand) -> Pair:
 
 
 def quotient(code: Code, first: Pair | None, factors: list[tuple[Constant, Pair]], divisor: Pair) -> Pair:
-    """The sum of a pair and of products of a constant and a pair, over an integer; in order.
+    """The sum of a pair and of products of a constant and a pair, over an integer, normalised.
 
     divisor: the number and its inverse.
     """
     total = first
     for constant, factor in factors:
         product, error = code.two_product(constant[0], factor[0])
-        rest = code.fma(constant[0], factor[1], code.fma(constant[1], factor[0], error))
+        remainder = code.fma(constant[0], factor[1], code.fma(constant[1], factor[0], error))
         if total is None:
-            total = product, rest
+            total = product, remainder
         else:
-            high, lost = code.two_sum(total[0], product)
-            total = high, total[1] + (rest + lost)
+            high, sum_error = code.two_sum(total[0], product)
+            total = high, total[1] + (remainder + sum_error)
     assert total is not None
     integer, inverse = divisor
     quotient = total[0] * inverse
-    rest = code.fma(-quotient, integer, total[0]) + total[1]
-    return code.quick_two_sum(quotient, rest * inverse)
+    remainder = code.fma(-quotient, integer, total[0]) + total[1]
+    return code.quick_two_sum(quotient, remainder * inverse)
 
 
 def first_split(code: Code, units: list[Operand], slope: Operand, reach: Operand, depth: Operand) -> Operand:
-    """The order from which split coefficients are exact enough, an integer.
+    """The order from which split coefficients are accurate enough, an integer.
 
     depth: log2 of the state and how many bits below it the products of the units of Ω and the largest may be.
     """
@@ -159,8 +159,8 @@ def first_split(code: Code, units: list[Operand], slope: Operand, reach: Operand
     largest = lanes_bits[0]
     for bits in lanes_bits[1:]:
         largest = code.larger(bits, largest)
-    both = lanes_bits[0].unsigned_shift(_FRACTION_BITS) + largest.unsigned_shift(_FRACTION_BITS)
-    units_bits = both.to_double() - 2.0 * (_BIAS + _FRACTION_BITS)
+    exponents = lanes_bits[0].unsigned_shift(_FRACTION_BITS) + largest.unsigned_shift(_FRACTION_BITS)
+    units_bits = exponents.to_double() - 2.0 * (_BIAS + _FRACTION_BITS)
     length = reach - slope.to_double() * 2.0**-SLOPE_BITS
     fall = -SLACK - reach
     orders = (units_bits + length - depth) / fall
@@ -172,20 +172,20 @@ def judged(code: Code, units: list[Operand], largest: list[Operand]) -> tuple[Op
 
     largest: |y_m| 2^(e_0 - e_m), lane by lane.
     """
-    good, following = code.true, []
+    good, next_units = code.true, []
     for unit, lanewise in zip(units, largest, strict=True):
         peak = lanewise
         for lanes in _ROUND:
             peak = code.larger(peak, code.shuffle(lanewise, code.zero, lanes))
         fits, after = next_unit(code, unit, peak)
         good &= code.all_of(fits)
-        following.append(after)
-    return good, following
+        next_units.append(after)
+    return good, next_units
 
 
-def near(slope: Operand, asked: Operand) -> Operand:
+def near(slope: Operand, suggested: Operand) -> Operand:
     """Whether units that rise with ``slope`` are fine enough where ``asked`` is wanted, a bit."""
-    return slope - asked < int(TOLERATED_SLOPE * 2**SLOPE_BITS)
+    return slope - suggested < int(TOLERATED_SLOPE * 2**SLOPE_BITS)
 
 
 def slope_of(reach: Operand, length: Operand) -> Operand:
@@ -207,33 +207,33 @@ class SplitOrders:
     zero_row: Operand
 
     def begin(self, last: Operand) -> list[Operand]:
-        """Split y_0 to y_last; gives the largest |y_m| 2^(e_0 - e_m), lane by lane."""
+        """Split y_0 to y_last; returns the largest |y_m| 2^(e_0 - e_m), lane by lane."""
         series = self.series
 
-        def one(m: Operand, largest: list[Operand]) -> list[Operand]:
+        def order(m: Operand, largest: list[Operand]) -> list[Operand]:
             row = series.row(m)
             y = [series.pair(row, series.layout.value(v)) for v in series.vectors]
             return self._put(m, y, largest)[-len(largest) :]
 
         stop = last + 1
-        return series.code.loop(0, stop, one, [series.code.zero for _ in series.vectors])
+        return series.code.loop(0, stop, order, [series.code.zero for _ in series.vectors])
 
     def orders(
         self, start: Operand, stop: Operand, last: list[Operand], largest: list[Operand]
     ) -> tuple[list[Operand], list[Operand]]:
-        """y_(start+1) to y_stop; gives the words of the last, and the largest |y_m| as :meth:`begin` does."""
+        """Write y_(start+1) to y_stop; returns the words of the last, and the largest |y_m| as :meth:`begin`."""
         code, series, width = self.series.code, self.series, len(self.series.vectors)
 
         def order(n: Operand, values: list[Operand]) -> list[Operand]:
             words, sides = values[: 2 * width], values[2 * width : -width]
             products = self._products(n, sides)
-            following = [self._next(n, v, sums, (words[2 * v], words[2 * v + 1])) for v, sums in enumerate(products)]
+            next_pairs = [self._next(n, v, sums, (words[2 * v], words[2 * v + 1])) for v, sums in enumerate(products)]
             after = n + 1
             row = series.row(after)
-            for v, pair in enumerate(following):
+            for v, pair in enumerate(next_pairs):
                 for word in range(2):
                     code.store(pair[word], row, series.layout.value(v) + 8 * word)
-            return [*(word for pair in following for word in pair), *self._put(after, following, values[-width:])]
+            return [*(word for pair in next_pairs for word in pair), *self._put(after, next_pairs, values[-width:])]
 
         row = series.row(start)
         sides = [code.load(row, offset) for offset in self._places]
@@ -242,7 +242,7 @@ class SplitOrders:
 
     @property
     def _places(self) -> list[int]:
-        """Where R and its parts are in a row, and the parts of each L."""
+        """Offsets in a row of R and its parts, and of the parts of each L."""
         lefts = (self.series.layout.left(v) for v in self.series.vectors)
         return [0, 16, 24, *(offset + k for offset in lefts for k in (16, 24))]
 
@@ -254,8 +254,8 @@ class SplitOrders:
         return up, down
 
     def _put(self, m: Operand, y: list[Pair], largest: list[Operand]) -> list[Operand]:
-        """Split both sides of order m and store them; gives R and its parts, the parts of each L, and the largest |y|
-        2^(e_0 - e_m), this one with it.
+        """Split and store both sides of order m; returns R and its parts, the parts of each L, and the largest |y|
+        2^(e_0 - e_m) so far.
         """
         code, series = self.series.code, self.series
         row, sides, peaks = series.row(m), list[Operand](), []
@@ -282,11 +282,11 @@ class SplitOrders:
             at = self.series.row(m)
             return [code.load(at, offset) for offset in self._places]
 
-        def both(m: Operand, sums: list[Operand]) -> list[Operand]:
-            one, other = row(m), row(n - m)
-            return self._added(one, other, sums[: 3 * width]) + self._added(other, one, sums[3 * width :])
+        def pair_of_orders(m: Operand, sums: list[Operand]) -> list[Operand]:
+            row_m, row_rest = row(m), row(n - m)
+            return self._added(row_m, row_rest, sums[: 3 * width]) + self._added(row_rest, row_m, sums[3 * width :])
 
-        sums = code.loop(1, (n + 1).unsigned_shift(1), both, [code.zero] * (6 * width))
+        sums = code.loop(1, (n + 1).unsigned_shift(1), pair_of_orders, [code.zero] * (6 * width))
         odd = (n & 1) != 0
         middle, start = row(code.select(odd, self.zero_row, n.unsigned_shift(1))), row(0)
         first, second = self._added(middle, middle, sums[: 3 * width]), sums[3 * width :]
@@ -294,13 +294,13 @@ class SplitOrders:
         total = [x + y for x, y in zip(first, second, strict=True)]
         return [(total[3 * v], total[3 * v + 1] + total[3 * v + 2]) for v in self.series.vectors]
 
-    def _added(self, one: list[Operand], other: list[Operand], sums: list[Operand]) -> list[Operand]:
+    def _added(self, left_row: list[Operand], right_row: list[Operand], sums: list[Operand]) -> list[Operand]:
         """Three sums of each vector, with the products of L of one order and R of another."""
-        unsplit, coarse, fine = other[:3]
+        unsplit, coarse, fine = right_row[:3]
         result = []
         for v in self.series.vectors:
-            a, rest = one[3 + 2 * v : 5 + 2 * v]
-            for left, right, total in zip((a, a, rest), (coarse, fine, unsplit), sums[3 * v : 3 * v + 3], strict=True):
+            a, b = left_row[3 + 2 * v : 5 + 2 * v]
+            for left, right, total in zip((a, a, b), (coarse, fine, unsplit), sums[3 * v : 3 * v + 3], strict=True):
                 result.append(self.series.code.fma(left, right, total))
         return result
 
@@ -323,25 +323,25 @@ ORDER, LOW_ORDER, LEAST, MOST, STATUS, USED, TRIES, SLOPE, USED_TRIES, USED_SLOP
 was tried in split coefficients, and the slope of their units; the same of the last step."""
 OK, NON_FINITE, TOO_SMALL = range(3)
 AT_ONCE = 4
-"""Samples that are taken side by side: the operations of one wait for each other."""
+"""Samples that are evaluated together, as the operations of one depend on each other."""
 _HYSTERESIS = 3.0
 _TOLERATED = 1.0
 
 
 def layout_of(system: System, attitude: bool) -> Layout:
-    """Where the numbers of a motion stand."""
+    """The layout of a motion."""
     return Layout(2 if attitude else 1, len(permutations(system)))
 
 
 def build(system: System, attitude: bool, processor: Processor | None = None) -> Machine:
     """``advance``, ``sample`` and ``follow`` for this system.
 
-    advance(state, clock, counts, table, scratch, steps): at most so many steps, until the time covers the target; gives
-    their number.  The scratch holds the coefficients of the last one.
-    sample(scratch, n0, order, high, low, result): the polynomial of the last step at a time behind its beginning.
-    follow(state, clock, counts, table, scratch, highs, lows, progress, times, steps, result): steps and a row of the
-    result for each time that they cover, until all are or so many steps are taken.  The times |τ| > 0 in two words.
-    progress: times and steps done; it ends, too, at a time whose distance from the beginning of its step takes exact
+    advance(state, clock, counts, table, scratch, steps): at most so many steps, until the time reaches the target;
+    returns their number.  The scratch holds the coefficients of the last one.
+    sample(scratch, n0, order, high, low, result): the polynomial of the last step at a time after its beginning.
+    follow(state, clock, counts, table, scratch, highs, lows, progress, times, steps, result): steps, and a row of the
+    result for each time that they cover, up to the last time or so many steps.  The times |τ| > 0 are in two words.
+    progress: times and steps done; it also ends at a time whose distance from the beginning of its step needs exact
     numbers.
     """
     module = ir.Module("double_double")
@@ -361,9 +361,9 @@ def _write_sample(module: ir.Module, layout: Layout, system: System) -> None:
 
 
 def _put_samples(rows: Recurrence, orders: Pair, times: Sequence[Pair], result: Operand) -> None:
-    """The polynomial of the last step, at times behind its beginning; a row of the result for each.
+    """Write the polynomial of the last step at times after its beginning, a row of the result for each.
 
-    orders: its n0, above which doubles are enough here as they are in the sum at the end of the step, and its N.
+    orders: its n0, above which doubles suffice as in the sum at the end of the step, and its N.
     """
 
     def row(n: Operand) -> list[Pair]:
@@ -394,23 +394,23 @@ class _Follow(Following):
             self.code.store_one(word, self.clock, at)
 
     def put(self, done: Operand, head: Any, otherwise: Any) -> None:
-        one = self.code.builder.append_basic_block("one")
-        self._put(done, AT_ONCE, head, one)
-        self.code.builder.position_at_end(one)
+        single = self.code.builder.append_basic_block("one")
+        self._put(done, AT_ONCE, head, single)
+        self.code.builder.position_at_end(single)
         self._put(done, 1, head, otherwise)
 
     def _put(self, done: Operand, count: int, head: Any, otherwise: Any) -> None:
-        """Put so many rows of the result, of which those count whose times are covered, and go to the head; or nothing,
-        where one of these times takes exact numbers.
+        """Store ``count`` rows of the result, of which those with covered times count, and branch to the head; or to
+        ``otherwise`` where one of these times needs exact numbers.
         """
         code, b = self.code, self.code.builder
         began, put = (self.time(BEGAN), self.time(BEGAN_LOW)), b.append_basic_block("put")
         sure, times, end = code.true, [], done
         for k in range(count):
             index = code.smaller(done + k, self.times_count - 1)
-            at, known = behind(code, self._target(index), began, self.time(SIGN))
+            at, exact = behind(code, self._target(index), began, self.time(SIGN))
             is_covered = self.covered(index)
-            sure &= known | ~is_covered
+            sure &= exact | ~is_covered
             end += is_covered.extended()
             times.append(at)
         b.cbranch(sure, put, otherwise)
@@ -441,7 +441,7 @@ class _Step(Stepping):
         return covered((time, low), (target, target_low))
 
     def write_step(self) -> Operand:
-        """One step; whether it stands."""
+        """Write one step; returns whether it is accepted."""
         order, low_order = self.count(ORDER), self.count(LOW_ORDER)
         first = [self.series.pair(self.state, 16 * v) for v in self.series.vectors]
         self.series.put(0, first)
@@ -460,13 +460,13 @@ class _Step(Stepping):
     def _orders(
         self, first: list[Pair], start: Operand, units: list[Operand], slope: Operand
     ) -> tuple[Operand, list[Operand]]:
-        """y_1 to y_N; whether some are split, a bit, and the largest of their units."""
+        """Write y_1 to y_N; returns whether some are split, a bit, and their largest sizes."""
         code, series = self.code, self.series
         order, low_order = self.count(ORDER), self.count(LOW_ORDER)
         tried = self.count(TRIES) >= MOST_TRIES
-        wanted = first_split(code, units, slope, self.time(REACH), start + self.time(DEPTH))
-        split = splits(code, units, slope) & (wanted < low_order) & ~tried
-        pair_order = code.select(split, wanted, low_order)
+        first_order = first_split(code, units, slope, self.time(REACH), start + self.time(DEPTH))
+        split = splits(code, units, slope) & (first_order < low_order) & ~tried
+        pair_order = code.select(split, first_order, low_order)
         words = series.orders_in_pairs(first, pair_order)
         parts = SplitOrders(series, units, slope, order + 1)
         largest = parts.begin(code.select(split, pair_order, -1))
@@ -477,13 +477,13 @@ class _Step(Stepping):
     def _units_fit(
         self, split: Operand, units: list[Operand], slope: Operand, largest: list[Operand], length: Operand
     ) -> Operand:
-        """Whether the units of split coefficients were good, a bit; puts those of what comes next."""
-        fits, following = judged(self.code, units, largest)
-        asked = slope_of(self.time(REACH), length)
-        self.set_count(asked, SLOPE)
-        for v, unit in enumerate(following):
+        """Whether the units of split coefficients fit, a bit; stores those of the next step."""
+        fits, next_units = judged(self.code, units, largest)
+        suggested = slope_of(self.time(REACH), length)
+        self.set_count(suggested, SLOPE)
+        for v, unit in enumerate(next_units):
             self.code.store(unit, self.state, self.layout.units + 8 * v)
-        return (fits & near(slope, asked)) | ~split
+        return (fits & near(slope, suggested)) | ~split
 
     def _norm(self, n: Index) -> Operand:
         row, largest = self.series.row(n), self.code.zero
@@ -506,7 +506,7 @@ class _Step(Stepping):
         square = step * step
         h, h2, h4 = code.spread(step), code.spread(square), code.spread(square * square)
         top, low_top = order.unsigned_shift(2), low_order.unsigned_shift(2)
-        places = [(i, v) for i in range(4) for v in series.vectors]
+        quarters = [(i, v) for i in range(4) for v in series.vectors]
 
         def row(k: Operand, i: int) -> Operand:
             return series.row((k << 2) + i)
@@ -515,20 +515,20 @@ class _Step(Stepping):
             at = top - k
             return [
                 code.fma(total, h4, code.load(row(at, i), self.layout.value(v)))
-                for total, (i, v) in zip(sums, places, strict=True)
+                for total, (i, v) in zip(sums, quarters, strict=True)
             ]
 
         def pairs(k: Operand, words: list[Operand]) -> list[Operand]:
             at = low_top - k
             sums: list[Operand] = []
-            for index, (i, v) in enumerate(places):
+            for index, (i, v) in enumerate(quarters):
                 total = times(code, (words[2 * index], words[2 * index + 1]), h4)
                 sums += add(code, total, series.pair(row(at, i), self.layout.value(v)))
             return sums
 
-        sums = code.loop(0, top - low_top, plain, [code.zero] * len(places))
+        sums = code.loop(0, top - low_top, plain, [code.zero] * len(quarters))
         words = code.loop(0, low_top + 1, pairs, [w for s in sums for w in (s, code.zero)])
-        quarter = {offset: (words[2 * k], words[2 * k + 1]) for k, offset in enumerate(places)}
+        quarter = {offset: (words[2 * k], words[2 * k + 1]) for k, offset in enumerate(quarters)}
         result = []
         for v in series.vectors:
             even = add(code, times(code, quarter[2, v], h2), quarter[0, v])
@@ -537,7 +537,7 @@ class _Step(Stepping):
         return result
 
     def _judge(self, length: Operand, low_order: Operand, start: Operand, result: list[Pair]) -> Operand:
-        """Whether the step stands; sets the status, and the n0 of what comes next."""
+        """Whether the step is accepted; sets the status, and the n0 of the next step."""
         code = self.code
         time, room = self.time(TIME), self.time(ROOM)
         finite = code.true
@@ -552,13 +552,13 @@ class _Step(Stepping):
         can_fall = low_order > self.count(LEAST)
         rise = (above > room) & can_rise
         fall = (below < room - _HYSTERESIS) & can_fall
-        following = code.select(rise, low_order + 1, code.select(fall, low_order - 1, low_order))
-        self.set_count(following, LOW_ORDER)
+        next_order = code.select(rise, low_order + 1, code.select(fall, low_order - 1, low_order))
+        self.set_count(next_order, LOW_ORDER)
         again = (above > room + _TOLERATED) & can_rise
         return ~again & (status == OK)
 
     def _follow(self, good: Operand, fits: Operand, units: list[Operand], slope: Operand) -> None:
-        """The split coefficients that the step was done with, if it stands, and how often the next was tried."""
+        """Store the units of an accepted step, and the number of tries of the next."""
         code, b = self.code, self.code.builder
         tries = self.count(TRIES)
         with b.if_then(good):
@@ -581,7 +581,7 @@ class _Step(Stepping):
             for vector, pair in enumerate(result):
                 for word in range(2):
                     code.store(pair[word], self.state, 16 * vector + 8 * word)
-            total, rest = later(code, (time, low), length)
-            for value, offset in ((time, BEGAN), (low, BEGAN_LOW), (total, TIME), (rest, TIME_LOW)):
+            total, low_word = later(code, (time, low), length)
+            for value, offset in ((time, BEGAN), (low, BEGAN_LOW), (total, TIME), (low_word, TIME_LOW)):
                 code.store_one(value, self.clock, offset)
             self.set_count(low_order, USED)

@@ -9,11 +9,11 @@ with i + j = k:
 
 d and l are exact, and l is a multiple of g_(k+1): nothing is lost but in the last level, as long as each S_k stays
 between 2^52 g_k and 2^53 g_k wherever a low part is added to it.  That is checked there, by the exponent: the bits of
-S ^ C are gathered, and a set exponent bit says that the step must not stand.
+S ^ C are accumulated, and a set exponent bit means that the step must be rejected.
 
 Where K b bits are more than a double's exponents reach, each word is kept over its own unit, as an integer, and S_k
-over g_(k+1).  Then what goes on to the next word is multiplied by 2^b on its way, and a carry by 2^-b: the operations
-are the same, and as exact (:attr:`Grid.relative`).
+over g_(k+1).  Then a low part is multiplied by 2^b when it moves to the next word, and a carry by 2^-b: the operations
+are the same and exact (:attr:`Grid.relative`).
 """
 
 from __future__ import annotations
@@ -51,9 +51,8 @@ class Grid:
 
     relative: whether word k is kept over its unit g_k; only where the grid is whole.
 
-    whole: whether the last word is a whole multiple of its unit too, as proofs need it.  Else its sums begin at 0: it
-    keeps some bits below the unit, and coefficients below the unit are not rounded away, which would err in the same
-    way at every step.
+    whole: whether the last word is a multiple of its unit too, as proofs need it.  Else its sums begin at 0: it keeps
+    some bits below the unit, and coefficients below the unit are not rounded to 0, an error that would accumulate.
     """
 
     words: int
@@ -63,14 +62,14 @@ class Grid:
 
     @property
     def bounded(self) -> bool:
-        """Whether words are kept so small that products with the coefficients of the field need not be watched.
+        """Whether words are so small that products with the coefficients of the field need no check.
 
-        With fewer words nothing is gained by it.
+        With fewer words it gains nothing.
         """
         return not self.whole and self.words >= _FEWEST_BOUNDED and self.bits <= _WIDEST_BOUNDED
 
     def most_bits(self, k: int) -> int:
-        """log2 of what word k of a coefficient stays below, in its units.
+        """log2 of the bound of word k of a coefficient, in its units.
 
         At the start of a step |ω| ≤ 4, |γ| and |ξ| ≤ √3 and so 2 |γ × ω| < 16: short steps keep within.
         """
@@ -80,7 +79,7 @@ class Grid:
 
     @property
     def smallest(self) -> float:
-        """The bound of two coefficients in a row where the series ends, as the last word is kept."""
+        """The bound of the two successive coefficients that end a series, in the scale of the last word."""
         return self.unit(self.words - 1) * (2.0 if self.whole else 2.0**-12)
 
     @property
@@ -94,25 +93,25 @@ class Grid:
         return float(2.0**self.bits) if self.relative else 1.0
 
     def unit(self, k: int) -> float:
-        """g_k, as word k is kept."""
+        """g_k, in the scale of word k."""
         return 1.0 if self.relative else float(2.0 ** (-self.bits * (k + 1)))
 
     def centre(self, k: int) -> float:
-        """The number that is added to word k and taken away again where it is rounded to its unit."""
+        """The number that rounds word k to its unit when added and subtracted."""
         if k == self.words - 1 and not self.whole:
             return 0.0
         return 1.5 * 2.0**52 * self.unit(k)
 
     def coarse(self, k: int) -> float:
-        """C_k, at which a sum for level k begins, as it is kept: over the unit of the next level where words are."""
+        """C_k, at which a sum for level k begins, in the scale of that sum."""
         return self.centre(k) * self.apart
 
 
 @dataclass(slots=True)
 class Accumulator:
-    """Sums for the levels ``base`` to K − 1, and the bits in which they left their range.
+    """Sums for the levels ``base`` to K − 1, and the bits that show whether they left their range.
 
-    sums: S_k.  seen: gathered bits of S ^ C, eight integers.
+    sums: S_k.  seen: the accumulated bits of S ^ C, eight integers.
     """
 
     code: Code
@@ -124,10 +123,10 @@ class Accumulator:
     def add_product(self, a: list[Operand], b: list[Operand], watched: bool = False, below: bool = False) -> None:
         """Add a b, of words numbered from 0 that count from level ``base`` on.
 
-        What goes to the last level is added up before it gets there: its sum is what the next product waits for.
+        Terms of the last level are summed before they are added to it, as the next product depends on its sum.
 
-        watched: look at a sum after each of its products, not only where low parts are added to it.
-        below: with the products of the level below the last, rounded.
+        watched: check a sum after each of its products, not only where low parts are added to it.
+        below: include the products of the level below the last, rounded.
         """
         code, last = self.code, len(self.sums) - 1
         if last == 0:
@@ -155,13 +154,13 @@ class Accumulator:
         self.sums[last] += low
 
     def look(self, k: int) -> None:
-        """Gather the bits of a sum; those of the last level are of no account."""
+        """Accumulate the bits of a sum; the last level needs no check."""
         level = self.base + k
         if level < self.grid.words - 1:
             self.seen |= self.sums[k].bits() ^ _bits(self.grid.coarse(level))
 
     def look_at_all(self) -> None:
-        """Gather the bits of every sum."""
+        """Accumulate the bits of every sum."""
         for k in range(len(self.sums)):
             self.look(k)
 
@@ -200,7 +199,7 @@ def _write_kernel(module: ir.Module, grid: Grid, count: int, row: int) -> ir.Fun
         at = code.address(left, m * row)
         against = code.address(right, m * -row)
         a, c = ([code.load(base, 8 * i) for i in range(count)] for base in (at, against))
-        # where a leading word is small in some lane, these would be left out alike at every step
+        # where a leading word is small in some lane, their omission would accumulate
         total.add_product(a, c, below=count == 2 and not grid.whole)
         return [*total.sums, total.seen]
 
@@ -214,14 +213,14 @@ def _write_kernel(module: ir.Module, grid: Grid, count: int, row: int) -> ir.Fun
 
 
 _UNROLLED = 4
-"""Products of a level that are written out one after another."""
+"""Products of a level in an unrolled loop."""
 
 
 def write_long_kernel(module: ir.Module, grid: Grid, row: int) -> ir.Function:
     """The functions of :func:`write_kernels` as one, (left, right, count, sums, seen, levels), of a relative grid.
 
-    It is a loop over the products of a level: written out, its code would not stay in the processor's cache.  Levels do
-    not wait for each other: what is left of a level is added behind the products of the next, between two looks.
+    It is a loop over the products of a level: unrolled, its code would not fit into the processor's cache.  Levels do
+    not depend on each other: the low parts of a level are added after the products of the next, between two checks.
     """
     arguments = [POINTER, POINTER, INT, POINTER, POINTER, INT]
     made, code = function(module, "long_products", ir.VoidType(), arguments)
@@ -283,7 +282,7 @@ def write_long_kernel(module: ir.Module, grid: Grid, row: int) -> ir.Function:
 def bounded_product(code: Code, grid: Grid, a: list[Operand], b: list[Operand], zeros: int = 0) -> list[Operand]:
     """a b in K words, not carried, where no sum can leave its range; low parts are added at the end.
 
-    zeros: so many leading words of b are 0, and are passed over.
+    zeros: the number of leading words of b that are 0 and are skipped.
 
     a: a coefficient of the field, |a_0| ≤ 2^b units and the others half as many at most.  b: |b_0| ≤ 2^(b + 4) units,
     the others at most 2^(b + 2).  Over 2^b units, the sum for level k is at most 2^4 for k = 0 and else
@@ -299,7 +298,7 @@ def bounded_product(code: Code, grid: Grid, a: list[Operand], b: list[Operand], 
             total = after
         products.append(total - centre)
     total = code.zero
-    # those of the level below the last first: where a leading word is 0 they are what is left
+    # those of the level below the last first: they matter where a leading word is 0
     for i, j in [(i, last + 1 - i) for i in range(1, last + 1)] + [(i, last - i) for i in range(last + 1)]:
         if j >= zeros:
             total = code.fma(a[i], b[j], total)
@@ -308,28 +307,28 @@ def bounded_product(code: Code, grid: Grid, a: list[Operand], b: list[Operand], 
 
 
 def passed_on(code: Code, grid: Grid, left: Operand, word: Operand) -> Operand:
-    """``word`` and what is ``left`` of the word before it."""
+    """``word`` plus the remainder ``left`` of the word before it."""
     return code.fma(left, grid.apart, word) if grid.relative else word + left
 
 
 def carried_over(code: Code, grid: Grid, carry: Operand, word: Operand) -> Operand:
-    """``word`` and the ``carry`` of the word behind it."""
+    """``word`` plus the ``carry`` of the word after it."""
     return code.fma(carry, 1 / grid.apart, word) if grid.relative else word + carry
 
 
 def centred(code: Code, grid: Grid, count: int) -> list[Operand]:
-    """The beginning of all sums."""
+    """The initial values of all sums."""
     return [code.constant(grid.coarse(k)) for k in range(count)]
 
 
 def summed(code: Code, grid: Grid, sums: list[Operand]) -> list[Operand]:
-    """Sums that began there, as words."""
+    """The words of sums from :func:`centred`."""
     words = [s - c for s, c in zip(sums, centred(code, grid, len(sums)), strict=True)]
     return [word * (1 / grid.apart) for word in words] if grid.relative else words
 
 
 def carried(code: Code, grid: Grid, words: list[Operand]) -> list[Operand]:
-    """A number with each word but the first near b bits wide again."""
+    """A number with carries, so that each word but the first has about b bits."""
     carries = []
     for k in range(1, grid.words):
         big = code.constant(grid.coarse(k - 1))
@@ -341,24 +340,24 @@ def carried(code: Code, grid: Grid, words: list[Operand]) -> list[Operand]:
     return result
 
 
-# Exact numbers as words on fixed grids, and which grid serves a number of bits.
+# Exact numbers as words on fixed grids, and the grid for a number of bits.
 
 
-# words up to which so many bits are safe in each: products of a few hundred orders stay inside the sums
+# (words, bits of each): products of a few hundred orders stay inside the range of the sums
 _BITS_OF_A_WORD = ((2, 48), (4, 46), (6, 45), (12, 44), (45, 43))
 MOST_WORDS = 24
-"""Up to which every unit is a double."""
+"""The most words whose units are doubles."""
 _NARROWER = 2
-"""By so many bits words are narrower where that is enough: fewer bits take fewer orders."""
+"""Words are narrower by so many bits where that suffices, as fewer bits take fewer orders."""
 
 
 def grid_of(words: int, whole: bool = False) -> Grid:
-    """The grid of so many words, 2 to 24, or to 45 where it is ``whole``, as in :class:`Grid`."""
+    """The grid of 2 to 24 words, or to 45 if ``whole``, as in :class:`Grid`."""
     return Grid(words, next(bits for most, bits in _BITS_OF_A_WORD if words <= most), whole, words > MOST_WORDS)
 
 
 def grid_for(bits: int) -> Grid | None:
-    """The smallest grid of at least so many bits and three words, of two widths a word; None where absent."""
+    """The smallest grid of at least ``bits`` bits and three words, of two widths a word; None where there is none."""
     wide = next((grid for grid in map(grid_of, range(3, MOST_WORDS + 1)) if grid.total >= bits), None)
     if wide is None:
         return None
@@ -372,7 +371,7 @@ def digits(value: Fraction, grid: Grid) -> list[float]:
 
 
 def words_of(ulps: int, grid: Grid) -> list[float]:
-    """So many of the last unit, as words."""
+    """The words of an integer number of the last unit."""
     words = []
     for k in range(grid.words):
         shift = grid.bits * (grid.words - 1 - k)
@@ -383,14 +382,14 @@ def words_of(ulps: int, grid: Grid) -> list[float]:
 
 
 def exact(words: Doubles) -> Fraction:
-    """The number that words add to."""
+    """The exact sum of words."""
     ratios = [word.as_integer_ratio() for word in words.tolist()]
     bottom = max(below for _, below in ratios)  # all are powers of two
     return Fraction(sum(above * (bottom // below) for above, below in ratios), bottom)
 
 
-# How large the words of a series are, in machine code: what the proof of
-# :mod:`heavytop.multiword.fixed_point.certified_series` needs.
+# The sizes of the words of a series, in machine code, for the proof of
+# :mod:`heavytop.multiword.fixed_point.certified_series`.
 
 
 # y out of L = (Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2, …): lane by lane L[first] − L[second]/2, where 8 is a zero
@@ -398,7 +397,7 @@ _FIRST, _SECOND = (2, 0, 1, 4, 5, 3, 8, 8), (8, 8, 8, 5, 5, 5, 8, 8)
 
 
 FIRST_BEHIND = 20
-"""The first word of those whose sizes are kept apart: what lies before it is a double far above the smallest."""
+"""The first word of those whose sizes are stored separately: those before it are far above the smallest double."""
 
 
 @once
@@ -433,11 +432,11 @@ def machine(grid: Grid, vectors: int) -> Machine:
                 code.store(code.load(added, offset) + magnitude, added, offset)
                 value, size = (carried_over(code, grid, *pair) for pair in ((value, y), (size, magnitude)))
                 far = size if k == FIRST_BEHIND else far
-            here = (n * vectors + v) * 8
-            code.store(value * coarser, code.address(values, here), 0)
-            code.store(size * coarser, code.address(sizes, here), 0)
+            offset_of_order = (n * vectors + v) * 8
+            code.store(value * coarser, code.address(values, offset_of_order), 0)
+            code.store(size * coarser, code.address(sizes, offset_of_order), 0)
             if grid.relative:
-                code.store(far, code.address(behind, here), 0)
+                code.store(far, code.address(behind, offset_of_order), 0)
 
     code.loop(0, orders + 1, order, [])
     code.builder.ret_void()

@@ -1,4 +1,4 @@
-"""Taylor coefficients of a step on a grid of K words, with a proven bound of what they lack.
+"""Taylor coefficients of a step on a grid of K words, with a proven bound of their error.
 
 g_k = 2^(−b(k + 1)) is the unit of word k, g = g_(K−1) the last.  The code of
 :mod:`heavytop.multiword.fixed_point.steps` gives b_0, …, b_N, whole multiples of g that stand for y_n h^n.  Let f_n be
@@ -8,7 +8,7 @@ the coefficient of τ^n in f(Σ b_n τ^n), exactly.
 
     |b_(n+1) − h f_n/(n + 1)| ≤ (H (2 ε_n + ε' + κ) + ½ g)/(n + 1) + ¾ g,   H = h 2^e,                            (2)
 
-where the coefficients of the field are kept over 2^e.  ε_n, ε', κ are given below; with T = n + 1 terms ε_n is of the
+where the coefficients of the field are stored over 2^e.  ε_n, ε', κ are given below; with T = n + 1 terms ε_n is of the
 order T K ulp.  The sum of (2) over n < N bounds the integral of the defect over the step: :attr:`Series.rounding`.
 
 *Sums of products.*  Let l_i and r_j bound the words L_i and R_j of all orders in a lane, and m_ij = l_i r_j.  A sum for
@@ -17,33 +17,33 @@ Suppose, for all k < K − 1,
 
     Σ_(i+j=k) m_ij + 3 max_(i+j=k) m_ij ≤ 2^52 (1 − 2^-20) g_k.                                                  (1)
 
-Between two looks at a sum it takes in the products of one level of one term, and one more at most, where its level is
-the first of the next kernel.  It was in [2^52, 2^53) g_k when it was looked at, so x ≥ 2 |a b| by (1); hence
+Between two checks of a sum the products of one level of one term are added to it, and one more at most, where its level
+is the first of the next kernel.  It was in [2^52, 2^53) g_k when it was checked, so x ≥ 2 |a b| by (1); hence
 x/2 ≤ s ≤ 2 x and d is exact (Sterbenz).  a b is a multiple of g_i g_j = g_(k+1), and so is l, the rounding of x + a b,
-with |l| ≤ g_k = 2^b g_(k+1).  So l is exact, and so is the sum of K of them.  Lows are added between two looks: the sum
-is a multiple of g_(k+1) before and at most 2^53 g_(k+1) after, so it is exact.  Nothing is lost but in the last level,
-which no one looks at; what a product adds to it is summed first.  With T terms its sum stays below
+with |l| ≤ g_k = 2^b g_(k+1).  So l is exact, and so is the sum of K of them.  Lows are added between two checks: the
+sum is a multiple of g_(k+1) before and at most 2^53 g_(k+1) after, so it is exact.  Only the last level is inexact and
+not checked; the terms of a product are summed before they are added to it.  With T terms its sum stays below
 
     B = 1.5 2^52 g + T (Σ_(i+j=K−1) m_ij + K 2^b g);
 
 each of its T (K + 1) roundings is at most 2^-53 B, and so is that of taking C away, and T products with i + j ≥ K are
 left out.  So the error is at most ε(T) = T ((K + 1) 2^-53 B + Σ_(i+j≥K) m_ij) + 2^-53 B, and ε_n = ε(n + 1).
 
-*The coefficients of the field.*  Each sum is looked at after each product.  Two numbers of [2^52, 2^53) g_k differ by a
+*The coefficients of the field.*  Each sum is checked after each product.  Two numbers of [2^52, 2^53) g_k differ by a
 multiple of g_k below 2^52 g_k, so d is exact without (1).  ε' is ε(T) for T sources.  The coefficients are at most 1,
-rounded to nearest: l_0 = 2^b g_0, l_k = 2^(b−1) g_k.  The sources are y, with words that are looked at afterwards, and
+rounded to nearest: l_0 = 2^b g_0, l_k = 2^(b−1) g_k.  The sources are y, with words that are checked afterwards, and
 the gathered sums, whose first word is below 2^51 g_0 (it is watched) and whose others are, after their carries, at most
 4 (2^(b−1) + 1 + 2^-b B/g) g_k, where B ≤ 2^(b+c) g, c = 16, or 18 on a relative grid.  Up to four sums are gathered in
 a lane, and there A = ½: hence 2 ε_n.  The coefficients are wrong by g/2 at most, the sources below
 2^51 g_0 (1 + 2^(1−b)): κ = 1.01 T 2^(50−b) g.
 
-*The rest.*  Carries, gathering and multiplication by 16 are exact for words below 2^51 units, which is watched for the
-first.  Multiplication by the power of two that is left passes what is below a unit on to the next word, exactly where
-that power is 2^-b at least, and drops g/2 at most in the last.  The division passes on the exact remainder: a quotient
-is right to ½ unit and 2^-53 of itself, that is ¾ of a unit, and the last remainder is dropped.  Dividends behind the
-first word are below 2^53 units (watched), so that from n = 3 on their quotients are below 2^51; before that they are at
-most (1.01 + (n + 1)/2 + ¼) 2^b units.  Words that count as 0 are added to the next, exactly for sums below 2^51 units.
-The sum of all b_n is exact where Σ |word k of b_n| ≤ 2^52 g_k.
+*Other operations.*  Carries, gathering and multiplication by 16 are exact for words below 2^51 units, which is watched
+for the first.  Multiplication by the power of two that is left passes what is below a unit on to the next word, exactly
+where that power is 2^-b at least, and drops g/2 at most in the last.  The division passes on the exact remainder: a
+quotient is right to ½ unit and 2^-53 of itself, that is ¾ of a unit, and the last remainder is dropped.  Dividends
+behind the first word are below 2^53 units (watched), so that from n = 3 on their quotients are below 2^51; before that
+they are at most (1.01 + (n + 1)/2 + ¼) 2^b units.  Words that count as 0 are added to the next, exactly for sums below
+2^51 units. The sum of all b_n is exact where Σ |word k of b_n| ≤ 2^52 g_k.
 """
 
 from __future__ import annotations
@@ -68,21 +68,21 @@ from heavytop.multiword.problem import Scaled
 _UP = 1 + 2.0**-40
 _ROOM = 1 - 2.0**-20
 _BEHIND_ALONE = 2.0**-880
-"""Numbers without words before those are smaller."""
+"""The bound of numbers without words before those."""
 _UNDERFLOW = 2.0**-1000
-"""More than sizes lose below the smallest double."""
+"""An upper bound of the underflow of sizes."""
 
 
 class Total(Sequence[int]):
-    """Σ b_n of each component, whole ulps: kept as words, from which the next step begins."""
+    """Σ b_n of each component, whole ulps, stored as words, from which the next step starts."""
 
     def __init__(self, words: Doubles, certified: CertifiedSeries) -> None:
         self.words, self._carrier = words, certified
 
     @cached_property
     def _values(self) -> list[int]:
-        grid, places = self._carrier.grid, self._carrier.places
-        return list(in_ulps(self.words[places], grid))
+        grid, indices = self._carrier.grid, self._carrier.places
+        return list(in_ulps(self.words[indices], grid))
 
     def __len__(self) -> int:
         return len(self._carrier.places)
@@ -112,7 +112,7 @@ class WordSeries:
 
     @property
     def thrifty(self) -> tuple[float, float]:
-        """Orders a bit between which a unit of time costs least: a step costs more than its products."""
+        """Orders per bit between which a unit of time costs least: a step costs more than its products."""
         return 0.4, 0.58
 
     @property
@@ -122,7 +122,7 @@ class WordSeries:
 
     @cached_property
     def values(self) -> list[list[int]]:
-        """The coefficients of each component, whole ulps: computed once more, for few steps are asked for them."""
+        """The coefficients of each component, whole ulps; recomputed, as few steps need them."""
         return self.certified.coefficients(self.centre, self.halvings)
 
     def scaled(self, rate: int) -> Doubles:
@@ -136,12 +136,12 @@ class WordSeries:
         return sizes
 
     def rounded(self, orders: int) -> Doubles:
-        """b_0 to b_orders of ``nearest``, as many as there are."""
+        """b_0 to b_orders of ``nearest``, or to its last."""
         return self.nearest[: orders + 1]
 
 
 class CertifiedSeries:
-    """Taylor coefficients of one motion on one grid; any thread may ask.
+    """Taylor coefficients of one motion on one grid; safe in threads.
 
     problem: so that |ω| ≤ 4 (:meth:`heavytop.multiword.problem.Scaled.of` with ``bounded``).
     """
@@ -169,7 +169,7 @@ class CertifiedSeries:
         return (CertifiedSeries, self._own)
 
     def series(self, centre: Sequence[int], halvings: int) -> WordSeries | None:
-        """From ``centre``, whole ulps 2^-(K b), with h = 2^-halvings; None where that is too long or words overflow."""
+        """The series from ``centre``, ulps 2^-(K b), h = 2^-halvings; None where that is too long or words overflow."""
         orders = self.computed(centre, halvings)
         if orders < 0:
             return None
@@ -187,7 +187,7 @@ class CertifiedSeries:
         return WordSeries(self, centre, halvings, Total(scratch.result.copy(), self), rounding, sizes, behind, nearest)
 
     def coefficients(self, centre: Sequence[int], halvings: int) -> list[list[int]]:
-        """b_0 to b_N of each component, whole ulps, where :meth:`series` gives some."""
+        """b_0 to b_N of each component, whole ulps, where :meth:`series` exists."""
         length, grid = self.computed(centre, halvings) + 1, self.grid
         table = (
             self.scratch()
@@ -200,7 +200,7 @@ class CertifiedSeries:
         return [in_ulps(component, grid).tolist() for component in parts]
 
     def computed(self, centre: Sequence[int], halvings: int) -> int:
-        """N, with the coefficients in the rows of this thread's scratch; negative where there are none."""
+        """N, with the coefficients in the rows of this thread's scratch; negative where the series does not exist."""
         exponent = self.excess - halvings
         if not -self.grid.bits <= exponent < 64:
             return UNSETTLED
@@ -214,7 +214,7 @@ class CertifiedSeries:
         return int(status)
 
     def scratch(self) -> _Scratch:
-        """This thread's."""
+        """The scratch of this thread."""
         if not hasattr(self._threads, "scratch"):
             self._threads.scratch = _Scratch(self)
         return cast("_Scratch", self._threads.scratch)
@@ -222,7 +222,7 @@ class CertifiedSeries:
     def bound(
         self, widest: Doubles, added: Doubles, orders: int, scale: float, products: int = 1, fields: int = 1
     ) -> float | None:
-        """The sum of (2) over n < N in ulps, with H = ``scale``; None where what is assumed does not hold.
+        """The sum of (2) over n < N in ulps, with H = ``scale``; None where an assumption does not hold.
 
         widest: max_n |word k|, shape (1 + vectors, K, 8), of R and each L.  added: Σ_n |word k of y|, shape
         (vectors, K, 8).  products: of an order, times n + 1.  fields: how often the sources are those of the field.
@@ -230,8 +230,8 @@ class CertifiedSeries:
         grid = self.grid
         wide = widest / self._units
         left, right = numpy.maximum.reduce(wide[1:]), wide[0]
-        one, levels = _levels(grid, right, left)
-        sums = levels[: grid.words - 1] + 3 * one[: grid.words - 1]
+        largest_products, levels = _levels(grid, right, left)
+        sums = levels[: grid.words - 1] + 3 * largest_products[: grid.words - 1]
         # γ1 and γ3 are differences of L's
         state = (1.5 * numpy.maximum.reduce(left, 1)).tolist()
         term, once = _error(grid, levels, products * orders)
@@ -249,7 +249,7 @@ class CertifiedSeries:
         return (scale * (2 * term * products * orders + alone) + harmonic / 2 + 0.75 * orders) * _UP
 
     def _error_of_constants(self, count: int) -> float:
-        """ε' + κ in ulps, of so many sources."""
+        """ε' + κ in ulps, of ``count`` sources."""
         grid = self.grid
         constants = numpy.full((grid.words, 1), 2.0 ** (grid.bits - 1))
         constants[0] = 2.0**grid.bits
@@ -265,16 +265,16 @@ def _largest(sizes: Doubles, length: int, size: int) -> Doubles:
 
 
 class _Scratch:
-    """The arrays that one thread computes with."""
+    """The arrays of one thread."""
 
     def __init__(self, certified: CertifiedSeries) -> None:
         words, vectors = certified.grid.words, certified.vectors
         size, orders = 8 * words * vectors, most_orders(certified.grid) + 2
         room = size_of(certified.grid, vectors)
         self.state, self.result, self.rows = doubles(size), doubles(size), doubles(room.rows)
-        kept = [self.state, certified.constants, certified.inverses, self.rows]
+        inputs = [self.state, certified.constants, certified.inverses, self.rows]
         places = numpy.zeros(room.places, numpy.int64)
-        self._kept: list[Doubles | Integers] = [*kept, doubles(room.sums), places, doubles(8)]
+        self._kept: list[Doubles | Integers] = [*inputs, doubles(room.sums), places, doubles(8)]
         self.pointers, self.found = [pointer(array) for array in self._kept], pointer(self.result)
         self.values, self.sizes = doubles(8 * vectors * orders), doubles(8 * vectors * orders)
         widest, added = doubles(8 * words * (1 + vectors)), doubles(size)
@@ -284,7 +284,7 @@ class _Scratch:
 
 
 def _carried_bits(grid: Grid) -> int:
-    """c: log2 of what the last word may carry over."""
+    """c: log2 of the largest carry of the last word."""
     return 18 if grid.relative else 16
 
 
@@ -317,7 +317,7 @@ def _error(grid: Grid, products: Doubles, terms: int) -> tuple[float, float]:
 
 
 def components(left: Doubles) -> list[Doubles]:
-    """The words of y, exactly, out of those of L = (Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2, …) along the last axis."""
+    """The exact words of y from those of L = (Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2, …) along the last axis."""
     middle = left[..., 5] / 2
     return [*(left[..., lane] for lane in (2, 0, 1)), left[..., 4] - middle, middle, left[..., 3] - middle]
 

@@ -1,4 +1,4 @@
-"""Taylor coefficients of first variations along a step, on its grid of K words, with a proven bound of what they lack.
+"""Taylor coefficients of first variations along a step, on its grid of K words, with a proven bound of their error.
 
 Along the polynomial p = Σ b_n τⁿ of a step, with y' = h f(y) and f = Q(y, y) + L y, a column
 
@@ -10,10 +10,10 @@ of the motion, in as many words.  G is of the same form as f, and its products a
 once for all data.  A column ends at the order N of the step, or later where it is not small there: the further b_n
 are 0.
 
-*What coefficients lack.*  The proof is that of :mod:`heavytop.multiword.fixed_point.certified_series`, with words of L
-and R that bound those of b and of v alike and with T = 2 (n + 1) products in a sum.  Where there is a datum, the field
-has twice the sources; the gathered sums of b err by ε(n + 1) more and are multiplied by at most 1, so that 3 (n + 1)
-products bound both.  Hence, with T = 2 or 3 times n + 1,
+*The error of coefficients.*  The proof is that of :mod:`heavytop.multiword.fixed_point.certified_series`, with words of
+L and R that bound those of b and of v alike and with T = 2 (n + 1) products in a sum.  Where there is a datum, the
+field has twice the sources; the gathered sums of b err by ε(n + 1) more and are multiplied by at most 1, so that 3 (n +
+1) products bound both.  Hence, with T = 2 or 3 times n + 1,
 
     |v_(n+1) − h (…)_n/(n + 1)| ≤ (H (2 ε(T) + ε' + κ) + ½ g)/(n + 1) + ¾ g.
 
@@ -58,14 +58,14 @@ from heavytop.multiword.fixed_point.steps import FIRED, SeriesCode, most_orders,
 from heavytop.top.equations import System
 
 _QUIET = 6
-"""Orders one after another in which words are 0 before they count as 0: as many as the state has components."""
+"""Successive orders in which words are 0 before they count as 0: as many as the state has components."""
 _LARGEST_LAST = 2.0**10
-"""Ulps of a last coefficient beyond which a column goes on after the motion: from near an equilibrium it has to."""
+"""Ulps of a last coefficient beyond which a column is longer than the motion, as near an equilibrium."""
 _UP = 1 + 2.0**-40
 
 
 class _ColumnRows(WordRows):
-    """The sums of a column.  places: behind those of a motion, for how many orders the first u + 1 words were 0."""
+    """The sums of a column.  places: also the number of orders in which the first u + 1 words were 0."""
 
     def begin(self, y: list[Operand], wide: Operand) -> Operand:
         for k in range(self.grid.words):
@@ -91,8 +91,8 @@ class _ColumnCode(SeriesCode):
     """Writes ``column(state, constants, inverses, rows, sums, places, seen, factor, raises, result, motion, known,
     order)`` and ``column_of_data(…, order, gathered, slopes)``.
 
-    As ``series``, for a column from ``state`` on.  motion, known: rows and places of the motion.  order: N.
-    gathered: what ``gather`` gives.  slopes: the words of G, as the constants are those of f.
+    As ``series``, for a column that starts at ``state``.  motion, known: rows and places of the motion.  order: N.
+    gathered: the result of ``gather``.  slopes: the words of G, in the layout of the constants of f.
     """
 
     of_data: bool = False
@@ -100,7 +100,7 @@ class _ColumnCode(SeriesCode):
     n: Operand = field(init=False)
 
     def write(self) -> ir.Function:
-        """The function; gives the order, or FIRED."""
+        """Write the function, which returns the order, or FIRED."""
         arguments = [POINTER] * 5 + [INT_POINTER, POINTER, DOUBLE, INT, POINTER, POINTER, INT_POINTER, INT]
         if self.of_data:
             arguments += [POINTER, POINTER]
@@ -136,22 +136,22 @@ class _ColumnCode(SeriesCode):
         rates, wide = self._rates(0, rows.end_sums(), y, wide)
         raised, wide = self._raised(rates, wide)
         quotient, wide = self._divided(n, self._times(raised), wide)
-        following, zeros, wide = rows.keep(n + 1, quotient, zeros, wide)
-        return [zeros, wide, *following, *(a + c for a, c in zip(total, following, strict=True))]
+        v_next, zeros, wide = rows.keep(n + 1, quotient, zeros, wide)
+        return [zeros, wide, *v_next, *(a + c for a, c in zip(total, v_next, strict=True))]
 
     def sources(
         self, vector: int, gathered: list[Operand], y: list[Operand]
     ) -> list[tuple[list[Operand], list[Operand]]]:
-        own = SeriesCode.sources(self, vector, gathered, y)
+        products = SeriesCode.sources(self, vector, gathered, y)
         if not self.of_data:
-            return own
+            return products
         code, words = self.code, self.grid.words
         at = code.address(code.arguments[13], self.n * (16 * words))
         sums, b_n = ([code.load(at, 8 * (words * half + k)) for k in range(words)] for half in range(2))
         slopes = code.arguments[14]
         for k, (_, source) in enumerate(SeriesCode.sources(self, vector, sums, b_n)):
-            own.append(([code.load(slopes, 8 * (words * k + i)) for i in range(words)], source))
-        return own
+            products.append(([code.load(slopes, 8 * (words * k + i)) for i in range(words)], source))
+        return products
 
     def write_gather(self) -> None:
         """Write ``gather(rows, places, sums, seen, order, result)``: the gathered sums of b and b_n, for n < order."""
@@ -159,12 +159,12 @@ class _ColumnCode(SeriesCode):
         _, self.code = function(self.module, "gather", ir.VoidType(), arguments)
         code, words = self.code, self.grid.words
         rows, places, sums, seen, order, result = code.arguments
-        kept = WordRows(code, self.grid, 1, most_orders(self.grid) + 2, rows, sums, places, seen, list(self.kernels))
+        along = WordRows(code, self.grid, 1, most_orders(self.grid) + 2, rows, sums, places, seen, list(self.kernels))
         code.store(code.zero, seen, 0)
 
         def one(n: Operand, _: list[Operand]) -> None:
-            products = kept.products(n, code.integer(words - 1), 0)
-            b_n = [component(code, word) for word in kept.stored(n, 0)]
+            products = along.products(n, code.integer(words - 1), 0)
+            b_n = [component(code, word) for word in along.stored(n, 0)]
             at = n * (16 * words)
             for k, word in enumerate([*self._gathered(carried(code, self.grid, products)), *b_n]):
                 code.store(word, result, at + 8 * k)
@@ -190,7 +190,7 @@ def machine(grid: Grid, system: System, data: bool) -> Machine:
 class WordColumns:
     """Φ, and σ of each datum, as polynomials of one order N; whole ulps, a list of components each.
 
-    total: Σ v_n.  values: every v_n, where they were asked for.  sizes: upper bounds of |v_n|, shape (columns, N + 1).
+    total: Σ v_n.  values: every v_n, if requested.  sizes: upper bounds of |v_n|, shape (columns, N + 1).
     rounding: bounds of Σ_(n < N) |v_(n+1) − h (…)_n/(n + 1)| in ulps, of any column of Φ and of any of σ.
     """
 
@@ -204,12 +204,12 @@ class WordColumns:
         return numpy.ldexp(self.sizes, rate * numpy.arange(self.sizes.shape[1]))
 
     def ends_small(self, grid: Grid) -> bool:
-        """Whether no last coefficient is above :data:`_LARGEST_LAST` ulps, which may be no normal doubles."""
+        """Whether no last coefficient exceeds :data:`_LARGEST_LAST` ulps, which may be subnormal."""
         return bool(self.sizes[:, -1].max() < ldexp(_LARGEST_LAST, -grid.total))
 
 
 class CertifiedColumns:
-    """The columns beside one motion on one grid; any thread may ask.
+    """The columns along one motion on one grid; safe in threads.
 
     slopes: G of each datum over the lanes of the motion, in its units.
     """
@@ -226,70 +226,70 @@ class CertifiedColumns:
         self._threads = local()
 
     def columns(self, centre: Sequence[int], halvings: int, values: bool = False) -> WordColumns | None:
-        """Beside the step from ``centre`` with h = 2^-halvings; None where there are none."""
+        """The columns along the step from ``centre`` with h = 2^-halvings; None where they do not exist."""
         certified = self.certified
         order = certified.computed(centre, halvings)
         if order < 0:
             return None
-        own, rows = self._scratch(), certified.scratch().rows
-        widest = own.of_motion(certified, order)
+        scratch, rows = self._scratch(), certified.scratch().rows
+        widest = scratch.of_motion(certified, order)
         row, most, reached = len(rows) // (most_orders(certified.grid) + 2), most_orders(certified.grid), order
         while True:
-            rows[row * (order + 1) : row * (reached + 1)] = 0  # what the motion has no coefficients for
-            columns = self._of_order(own, widest, reached, halvings, values)
+            rows[row * (order + 1) : row * (reached + 1)] = 0  # beyond the coefficients of the motion
+            columns = self._of_order(scratch, widest, reached, halvings, values)
             if columns is None or reached == most or columns.ends_small(certified.grid):
                 return columns
             reached = min(most, reached + reached // 2 + 8)
 
-    def _of_order(self, own: _Scratch, widest: Doubles, order: int, halvings: int, values: bool) -> WordColumns | None:
-        """All columns up to one order; widest: of the words of the motion."""
+    def _of_order(self, work: _Scratch, widest: Doubles, order: int, halvings: int, values: bool) -> WordColumns | None:
+        """All columns up to one order; widest: the largest words of the motion."""
         certified, words = self.certified, self.certified.grid.words
         factor, raises = raises_of(certified.excess - halvings)
         along, count = certified.scratch().pointers, 6 + len(self._slopes)
         if self.data:
-            self.machine.functions["gather"](along[3], along[5], along[4], along[6], order, own.gathered)
+            self.machine.functions["gather"](along[3], along[5], along[4], along[6], order, work.gathered)
         tables = []
         for column in range(count):
-            if not self._column(own, column, order, (certified.sign * factor, raises)):
+            if not self._column(work, column, order, (certified.sign * factor, raises)):
                 return None
-            certified.extents(own.pointers[3], order, *own.measures[column])
+            certified.extents(work.pointers[3], order, *work.measures[column])
             if values:
-                tables.append(own.values(certified, order))
+                tables.append(work.values(certified, order))
         rounding, scale = [0.0, 0.0], ldexp(1.0, certified.excess - halvings)
         for group, part in enumerate((slice(0, 6), slice(6, count))[: 1 + self.data]):
-            wide = numpy.maximum(widest, own.widest[part].max(axis=0))
-            bound = certified.bound(wide, own.added[part].max(axis=0), order, scale, 2 + group, 1 + group)
+            wide = numpy.maximum(widest, work.widest[part].max(axis=0))
+            bound = certified.bound(wide, work.added[part].max(axis=0), order, scale, 2 + group, 1 + group)
             if bound is None:
                 return None
             rounding[group] = bound
-        sizes = own.sizes[:count, : order + 1].max(axis=2) * _UP
-        ends = own.results[:count].reshape(count, words, 8).transpose(0, 2, 1)[:, :6]
+        sizes = work.sizes[:count, : order + 1].max(axis=2) * _UP
+        ends = work.results[:count].reshape(count, words, 8).transpose(0, 2, 1)[:, :6]
         total = in_ulps(ends, certified.grid).tolist()
         return WordColumns(total, tables if values else None, sizes, (rounding[0], rounding[1]))
 
     def _scratch(self) -> _Scratch:
-        """This thread's."""
+        """The scratch of this thread."""
         if not hasattr(self._threads, "scratch"):
             self._threads.scratch = _Scratch(self.certified, len(self._slopes))
         return cast("_Scratch", self._threads.scratch)
 
-    def _column(self, own: _Scratch, column: int, order: int, length: tuple[float, int]) -> bool:
-        """Compute one column into the rows; whether it stands."""
+    def _column(self, scratch: _Scratch, column: int, order: int, length: tuple[float, int]) -> bool:
+        """Compute one column into the rows; returns whether it is valid."""
         along = self.certified.scratch().pointers
-        own.state[:] = 0
-        arguments = [*own.pointers, *length, own.ends[column], along[3], along[5], order]
+        scratch.state[:] = 0
+        arguments = [*scratch.pointers, *length, scratch.ends[column], along[3], along[5], order]
         if column < 6:
-            own.state[column] = 1.0
+            scratch.state[column] = 1.0
             return int(self.machine.functions["column"](*arguments)) >= 0
-        arguments += [own.gathered, self._slopes[column - 6]]
+        arguments += [scratch.gathered, self._slopes[column - 6]]
         return int(self.machine.functions["column_of_data"](*arguments)) >= 0
 
 
 class _Scratch:
-    """The arrays that one thread computes columns in.
+    """The arrays of one thread for columns.
 
     results: Σ v_n of each.  sizes: Σ_k |word k of v_n|, shape (columns, orders, 8).  widest: the largest words of R and
-    L, and added Σ_n |word k|, of each column.  ends, measures: where these are.
+    L, and added Σ_n |word k|, of each column.  ends, measures: their addresses.
     """
 
     def __init__(self, certified: CertifiedSeries, data: int) -> None:
@@ -298,10 +298,10 @@ class _Scratch:
         self.state, self.rows = doubles(8 * grid.words), doubles(room.rows)
         gathered, places = doubles(16 * grid.words * orders), numpy.zeros(room.places + grid.words, numpy.int64)
         inputs, sums = [self.state, certified.constants, certified.inverses, self.rows], doubles(room.sums)
-        kept: list[Doubles | Integers] = [*inputs, sums, places, doubles(8)]
-        self.pointers, self.gathered = [pointer(array) for array in kept], pointer(gathered)
+        arrays_used: list[Doubles | Integers] = [*inputs, sums, places, doubles(8)]
+        self.pointers, self.gathered = [pointer(array) for array in arrays_used], pointer(gathered)
         nearest = doubles(8 * orders)
-        self._kept = [*kept, gathered, nearest]
+        self._kept = [*arrays_used, gathered, nearest]
         self.results: Doubles = doubles(8 * grid.words * count).reshape(count, -1)
         self.sizes: Doubles = doubles(8 * orders * count).reshape(count, orders, 8)
         self.widest: Doubles = doubles(16 * grid.words * count).reshape(count, 2, grid.words, 8)

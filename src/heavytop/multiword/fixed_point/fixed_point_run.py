@@ -1,4 +1,4 @@
-"""One motion in K words: what the machine code of :mod:`heavytop.multiword.fixed_point.steps` works on."""
+"""One motion in K words: the data of the machine code of :mod:`heavytop.multiword.fixed_point.steps`."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ LONGEST_STEP = 2**-_FEWEST_HALVINGS
 _MOST_HALVINGS = 40
 _HALVED_SAMPLES = 4
 _FINEST_TIME = _MOST_HALVINGS + 1
-"""Bits behind the point of the time at which a step ends, at most."""
+"""The most fractional bits of the time at the end of a step."""
 _STEPS_AT_ONCE = 64
 _LARGEST_TIME = Fraction(2) ** 1000
 TINY_BITS = 20
-"""A component that lies more bits below 1 asks for as many more; less is made up for by the spare ones of a format."""
+"""A component more bits below 1 needs as many more; the spare bits of a format cover fewer."""
 _SMALL = Fraction(1, 2**TINY_BITS)
 _FIRST_ORDERS = 6
 
@@ -36,7 +36,7 @@ machine = once(steps.build)
 
 
 def excess(problem: Scaled) -> int:
-    """e, so that the coefficients over 2^e are at most 1: as many bits are lost in products with them."""
+    """The least e for which the coefficients over 2^e are at most 1; products with them lose e bits."""
     largest, excess = problem.coefficients.largest, 0
     while largest > 2**excess:
         excess += 1
@@ -70,8 +70,8 @@ def inverses(grid: Grid) -> Doubles:
 
 
 def spread(problem: Scaled) -> int:
-    """How many bits the smallest component lies below 1: of those that are not 0 at the start, and of what tiny
-    coefficients make of the others, for an unstable axis would amplify that too.
+    """Bits by which the smallest component is below 1: of those that are not 0 at the start, and of those that tiny
+    coefficients move away from 0, as an unstable axis would amplify these too.
     """
     small = max((_below(value) for value in problem.state if value), default=0)
     coefficients = (c for vector in problem.coefficients.vectors for row in vector for c in row if c)
@@ -88,7 +88,7 @@ def spread(problem: Scaled) -> int:
 
 
 def _below(value: Fraction) -> int:
-    """How many bits ``value``, which is not 0, lies below 1; 0 where it is larger."""
+    """Bits by which ``value``, not 0, is below 1; 0 where it is larger."""
     return max(0, value.denominator.bit_length() - abs(value.numerator).bit_length() + 1)
 
 
@@ -118,7 +118,7 @@ class Fixed(ResumableRun):
 
     @property
     def _places(self) -> list[int]:
-        """Where the first word of each component is."""
+        """Offsets of the first word of each component."""
         second = 8 * self.grid.words
         return [*range(6), *(second + lane for lane in range(3, 6))][: len(self.problem.state)]
 
@@ -128,7 +128,7 @@ class Fixed(ResumableRun):
 
     @property
     def redone(self) -> int:
-        """Steps that were done again with half their length."""
+        """Steps that were repeated with half their length."""
         return int(self.counts[steps.REDONE])
 
     @property
@@ -171,11 +171,11 @@ class Fixed(ResumableRun):
     def sampled(
         self, times: Sequence[Fraction] | Doubles
     ) -> tuple[Status, Doubles, dict[int, tuple[Fraction, ...] | None]]:
-        """Steps until the last of the times |τ| > 0, in order: the bits of :meth:`advance` and :meth:`sample`.
+        """Steps up to the last of the times |τ| > 0, ascending, with the bits of :meth:`advance` and :meth:`sample`.
 
-        times: exact numbers, or an array of doubles, which takes less time.
-        The states that were reached, in K + 1 words, shape (samples, K + 1, 6 or 9); and by their places those states
-        that these words cannot hold, None where nothing can.
+        times: exact numbers, or an array of doubles, which is faster.
+        Returns the status, the states in K + 1 words, shape (samples, K + 1, 6 or 9), and by index the states that
+        overflow these words, None where no other form holds them.
         """
         are_doubles = isinstance(times, numpy.ndarray)
         ceilings = times if isinstance(times, numpy.ndarray) else numpy.array([_not_before(time) for time in times])
@@ -203,7 +203,7 @@ class Fixed(ResumableRun):
         return status, self._components(table[: progress[0]]), others
 
     def _follow(self, times: Doubles, at: Doubles, progress: Any, samples: Doubles) -> Status:
-        """Some steps and their samples, as far as doubles tell."""
+        """Some steps and their samples, as long as doubles suffice."""
         before, arrays = int(progress[1]), [pointer(array) for array in (times, at, progress)]
         follow = self.machine.functions["follow"]
         follow(*self.arrays, *arrays, len(times), before + _STEPS_AT_ONCE, pointer(samples))
@@ -211,7 +211,7 @@ class Fixed(ResumableRun):
         return Status(int(self.counts[steps.STATUS]))
 
     def _samples(self, pointers: tuple[Any, Any, Any], first: int, last: int) -> None:
-        """Samples of the last step from one to before another; pointers: to its rows, their words of x, the result."""
+        """Samples ``first`` to ``last`` − 1 of the last step; pointers: to its rows, the words of x, the result."""
         order, (rows, at, samples) = int(self.counts[steps.ORDERS]), pointers
         self.machine.functions["samples"](rows, order, at, first, last, samples)
 
@@ -225,7 +225,7 @@ class Fixed(ResumableRun):
         return [word for value in x for word in words_of(value, self.grid)]
 
     def _components(self, rows: Doubles) -> Doubles:
-        """The words of (Ω, γ, ξ) out of rows of samples; the last is what the one before it had to round."""
+        """The words of (Ω, γ, ξ) from rows of samples; the last word is the rounding error of the one before it."""
         count = self.grid.words
         table = rows.reshape(len(rows), -1, 8)
         left = [table[:, count * v : count * (v + 1)] for v in range(self.vectors)]
@@ -241,7 +241,7 @@ class Fixed(ResumableRun):
         return components
 
     def exact_state(self, words: Doubles, time: Fraction) -> tuple[Fraction, ...] | None:
-        """The state out of a row of samples, at ``time`` in the last step."""
+        """The state from a row of samples, at ``time`` in the last step."""
         if not words[-8:].max() <= most_of(self.grid):
             moved = self._moved(self._before(), time - self._began, _HALVED_SAMPLES)
             return None if moved is None else self._exact(moved)
@@ -250,7 +250,7 @@ class Fixed(ResumableRun):
         return state_of_left(lanes)
 
     def _moved(self, words: Doubles, span: Fraction, halvings: int) -> Doubles | None:
-        """The words after a time ``span``: one series; where a sum leaves its range, two of half the length."""
+        """The words after a time ``span``, by one series, or by two of half the length where a sum leaves its range."""
         moved, rows = doubles(len(words)), doubles(len(self.rows))
         arrays = [words, *self._scratch(constants(self.problem, self.grid, self.excess, span), rows)]
         factor, raises = steps.raises_of(self.excess)
@@ -286,7 +286,7 @@ class Fixed(ResumableRun):
 
 
 def state_of_left(lanes: Sequence[Any]) -> tuple[Any, ...]:
-    """Components out of L of each vector: Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2, or the last three with ξ for γ."""
+    """Components from L of each vector: Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2, or the last three with ξ for γ."""
     state: list[Any] = []
     for vector, left in enumerate(lanes):
         middle = left[5] / 2
@@ -296,11 +296,11 @@ def state_of_left(lanes: Sequence[Any]) -> tuple[Any, ...]:
 
 def _nearest(value: int, shift: int) -> int:
     """value/2^shift rounded to nearest, a tie to even."""
-    quotient, rest = value >> shift, value & (1 << shift) - 1
-    return quotient + (2 * rest > 1 << shift or (2 * rest == 1 << shift and quotient & 1))
+    quotient, remainder = value >> shift, value & (1 << shift) - 1
+    return quotient + (2 * remainder > 1 << shift or (2 * remainder == 1 << shift and quotient & 1))
 
 
 def _not_before(target: Fraction) -> float:
-    """The least double that is not less."""
+    """The least double that is not below ``target``."""
     near = float(target)
     return near if Fraction(near) >= target else float(numpy.nextafter(near, numpy.inf))

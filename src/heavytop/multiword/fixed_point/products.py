@@ -1,4 +1,4 @@
-"""How the coefficients of a step are kept, an order a row, and how their products are summed: what both ways share."""
+"""The storage of the coefficients of a step, an order a row, and the sums of their products: two implementations."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ class ProductSize:
 
 @dataclass(slots=True)
 class Rows(ABC):
-    """Writes what keeps the coefficients y_n of ``vectors`` state vectors, K words each, and sums their products.
+    """Writes code that stores the coefficients y_n of ``vectors`` state vectors, K words each, and sums their products.
 
-    orders: as many as there is room for.  rows, sums, places, seen: scratch as :meth:`size` says, zeros at first.
+    orders: the capacity.  rows, sums, places, seen: scratch of :meth:`size`, initially zeros.
     """
 
     code: Code
@@ -63,17 +63,17 @@ class Rows(ABC):
     @staticmethod
     @abstractmethod
     def size(grid: Grid, vectors: int, orders: int) -> ProductSize:
-        """The size that ``orders`` orders need."""
+        """The size of ``orders`` orders."""
 
     @staticmethod
     @abstractmethod
     def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[ir.Function]:
-        """The functions that sum products; which is best depends on how many registers there are, no result does."""
+        """The functions that sum products; wide: of the registers, on which no result depends."""
 
     @staticmethod
     @abstractmethod
     def left(rows: Doubles, grid: Grid, vectors: int, n: int, vector: int) -> list[Fraction]:
-        """The eight lanes of L of an order, out of the rows."""
+        """The eight lanes of L of an order, from the rows."""
 
     @abstractmethod
     def stored(self, n: Operand, vector: int) -> list[Operand]:
@@ -81,13 +81,13 @@ class Rows(ABC):
 
     @abstractmethod
     def begin(self, y: list[Operand], wide: Operand) -> Operand:
-        """Store y_0; gives the largest word over its limit."""
+        """Store y_0; returns the largest word over its limit."""
 
     @abstractmethod
     def keep(self, n: Index, y: list[Operand], zeros: Operand, wide: Operand) -> tuple[list[Operand], Operand, Operand]:
-        """Store y_n; gives y_n as it was stored, the zeros from now on, and the largest word over its limit.
+        """Store y_n; returns the stored y_n, the updated zeros, and the largest word over its limit.
 
-        zeros: an integer about leading zeros, which begins at 0.
+        zeros: an integer that describes leading zeros, initially 0.
         """
 
     @abstractmethod
@@ -101,18 +101,18 @@ class Rows(ABC):
         return [_side(self.code, parts[0], RIGHT), *(_side(self.code, part, LEFT) for part in parts)]
 
     def largest_sum(self, y: list[Operand]) -> Operand:
-        """The largest sum of |words| of a component, a double, as the last word is kept; infinite beyond a double."""
+        """The largest sum of |words| of a component, in the scale of the last word; infinite beyond a double."""
         code, words = self.code, self.grid.words
         largest = code.zero
         for v in range(self.vectors):
-            one = code.absolute(y[words * v])
+            total = code.absolute(y[words * v])
             for word in y[words * v + 1 : words * (v + 1)]:
-                one = passed_on(code, self.grid, one, code.absolute(word))
-            largest = code.larger(one, largest)
+                total = passed_on(code, self.grid, total, code.absolute(word))
+            largest = code.larger(total, largest)
         return code.largest(largest)
 
     def watch(self, wide: Operand, value: Operand, k: int, bits: int = WIDEST) -> Operand:
-        """The largest word so far, over 2^bits of its unit."""
+        """The largest word so far, relative to 2^bits of its unit."""
         share = self.code.absolute(value) * (2.0**-bits / self.grid.unit(k))
         return self.code.larger(share, wide)
 
@@ -128,10 +128,10 @@ def _side(code: Code, y: list[Operand], which: Sum) -> list[Operand]:
 # Sums of products of series in digits of 24 bits: every product and every sum is exact.
 #
 # Digits are integers, |d| ≤ 2^23 + 4.  A product of two is an integer of at most 2^46 (1 + 2^-18), and 120 of
-# them add up to less than 2^53: a double holds their sum, one operation a product, in any order and without a look at
+# them add up to less than 2^53: a double holds their sum, one operation a product, in any order and without a check of
 # exponents.  Products with i + j < q are computed in tiles, some digits of the left by as many of the right with a sum
-# for each i + j, over so many orders that no sum has more than 120 products; it is then split at 2^24, so that what
-# adds up over all orders stays far below 2^53 too.
+# for each i + j, over so many orders that no sum has more than 120 products; it is then split at 2^24, so that the
+# sums over all orders stay far below 2^53 too.
 
 
 BITS = 24
@@ -142,7 +142,7 @@ _ROUND = 1.5 * 2.0**52
 
 
 def rounded(code: Code, value: Operand, bit: int = 0) -> Operand:
-    """To the nearest multiple of 2^place, for |value| ≤ 2^(51 + place)."""
+    """``value`` rounded to the nearest multiple of 2^bit, for |value| ≤ 2^(51 + bit)."""
     big = code.constant(_ROUND * 2.0**bit)
     return value + big - big
 
@@ -164,7 +164,7 @@ _WIDE, _NARROW = _Tiles(8, 13, 18), _Tiles(4, 4, 7)
 def _write_tile(module: ir.Module, levels: int, side: int, most_sums: int) -> ir.Function:
     """(left, right, where, orders, sums): sums += Σ_m left[where[m]] right[−where[m]] for i + j < levels, i, j < side.
 
-    Split at 2^24: what is whole multiples of that is added to the level before.
+    Split at 2^24: multiples of that are added to the level before.
     """
     made, code = function(module, f"tile_{levels}_{side}", ir.VoidType(), [POINTER, POINTER, INT_POINTER, INT, POINTER])
     made.linkage = "internal"
@@ -173,11 +173,11 @@ def _write_tile(module: ir.Module, levels: int, side: int, most_sums: int) -> ir
     pairs = [
         [(i, level - i) for i in range(side) if 0 <= level - i < side] for level in range(min(levels, 2 * side - 1))
     ]
-    ways = [1] * len(pairs)
-    while sum(ways) < most_sums and (rest := [k for k, pair in enumerate(pairs) if ways[k] < len(pair)]):
-        ways[max(rest, key=lambda k: len(pairs[k]) / ways[k])] += 1
-    most = _PRODUCTS // max(map(len, pairs))
-    begins = [sum(ways[:level]) for level in range(len(ways) + 1)]
+    parts = [1] * len(pairs)
+    while sum(parts) < most_sums and (splittable := [k for k, pair in enumerate(pairs) if parts[k] < len(pair)]):
+        parts[max(splittable, key=lambda k: len(pairs[k]) / parts[k])] += 1
+    orders_per_group = _PRODUCTS // max(map(len, pairs))
+    begins = [sum(parts[:level]) for level in range(len(parts) + 1)]
 
     def order(m: Operand, values: list[Operand]) -> list[Operand]:
         at, sums = code.load_one(where, m), list(values)
@@ -187,30 +187,30 @@ def _write_tile(module: ir.Module, levels: int, side: int, most_sums: int) -> ir
             c = code.load(other, LANES * j)
             for i in range(side):
                 if i + j < levels:
-                    index = begins[i + j] + pairs[i + j].index((i, j)) % ways[i + j]
+                    index = begins[i + j] + pairs[i + j].index((i, j)) % parts[i + j]
                     sums[index] = code.multiply_add(a[i], c, sums[index])
         return sums
 
     def group(g: Operand, _: list[Operand]) -> None:
-        start = g * most
-        stop = code.smaller(start + most, orders)
+        start = g * orders_per_group
+        stop = code.smaller(start + orders_per_group, orders)
         _add_levels(code, sums, begins, code.loop(start, stop, order, [code.zero] * begins[-1]))
 
-    code.loop(0, (orders + (most - 1)) // most, group, [])
+    code.loop(0, (orders + (orders_per_group - 1)) // orders_per_group, group, [])
     code.builder.ret_void()
     return made
 
 
 def _add_levels(code: Code, sums: Operand, begins: list[int], values: list[Operand]) -> None:
     """sums += the values of each level, split at 2^24."""
-    carries, rest = [], []
+    carries, remainders = [], []
     for level in range(len(begins) - 1):
         first, *others = values[begins[level] : begins[level + 1]]
         for value in others:
             first += value
         carries.append(rounded(code, first, BITS))
-        rest.append(first - carries[-1])
-    for level, (value, carry) in enumerate(zip([code.zero, *rest], [*carries, code.zero], strict=True)):
+        remainders.append(first - carries[-1])
+    for level, (value, carry) in enumerate(zip([code.zero, *remainders], [*carries, code.zero], strict=True)):
         offset = LANES * level
         total = code.load(sums, offset) + value
         code.store(code.multiply_add(carry, 2.0**-BITS, total), sums, offset)
@@ -219,10 +219,10 @@ def _add_levels(code: Code, sums: Operand, begins: list[int], values: list[Opera
 def write_sums(module: ir.Module, wide: bool) -> ir.Function:
     """(left, right, where, orders, levels, sums): sums += Σ_m left[where[m]] right[−where[m]] for i + j < levels.
 
-    sums begins with what is whole multiples of a level before the first.  where counts doubles, a digit has eight.
+    sums begins with multiples of a level before the first.  where counts doubles, a digit has eight.
     wide: as :attr:`heavytop.multiword.codegen.machine_code.Processor.wide`; the sums are the same.
 
-    Few levels are one tile.  Else a few orders at a time, which stay near, go through all tiles.
+    Few levels are one tile.  Else all tiles are computed for a few orders at a time, which stay in cache.
     """
     sizes = _WIDE if wide else _NARROW
     side = sizes.side
@@ -241,15 +241,15 @@ def write_sums(module: ir.Module, wide: bool) -> ir.Function:
 
     def some(g: Operand, _: list[Operand]) -> None:
         start = g * group
-        rest = orders - start
-        count = code.smaller(rest, group)
+        remaining = orders - start
+        count = code.smaller(remaining, group)
 
         def one(i: Operand, _: list[Operand]) -> None:
             def other(j: Operand, _: list[Operand]) -> None:
                 ahead = i + j
-                both = [code.address(base, k * tile) for base, k in ((left, i), (right, j))]
-                places = [code.address(where, start), count, code.address(sums, ahead * tile)]
-                _call(code, tiles, levels - ahead * side, [*both, *places])
+                addresses = [code.address(base, k * tile) for base, k in ((left, i), (right, j))]
+                operands = [code.address(where, start), count, code.address(sums, ahead * tile)]
+                _call(code, tiles, levels - ahead * side, [*addresses, *operands])
 
             code.loop(0, parts - i, other, [])
 
@@ -261,7 +261,7 @@ def write_sums(module: ir.Module, wide: bool) -> ir.Function:
 
 
 def _call(code: Code, tiles: list[ir.Function], levels: Operand, arguments: list[Operand]) -> None:
-    """The tile of so many levels, if there are any, or the last."""
+    """Call the tile of so many levels, none for 0, the last for more."""
     b = code.builder
     end = b.append_basic_block("end")
     blocks = [b.append_basic_block(f"levels_{d}") for d in range(1, len(tiles) + 1)]
@@ -278,19 +278,19 @@ def _call(code: Code, tiles: list[ir.Function], levels: Operand, arguments: list
 # Coefficients in digits of 24 bits, whose products are summed exactly.
 #
 # L and R of an order are Σ_j d_j u_j with u_j = 2^(6 − 24 (j + 1)) and digits d_j, j < J, as
-# the code above takes them.  What is left out of a sum of n products of numbers,
-# products of digits with i + j ≥ J and what J digits lack, is at most n (J + 1)/4 units of the last word.
+# in the code above.  The error of a sum of n products of numbers, from products of digits with i + j ≥ J and from the
+# truncation to J digits, is at most n (J + 1)/4 units of the last word.
 #
 # From some order on the first z digits are 0: |y| ≤ u_(z−1)/8 is enough, for L and R are at most twice as large, and
 # what lies behind digit z is at most 0.51 u_(z−1).  S_n begins at level s = min_m z(m) + z(n − m), and the pair
-# (m, n − m) with digit z(m) on the left and digit s − z(m) on the right.  That is kept from lying more than two before
-# the first digit, where zeros are.  What a left side has behind its last digit then meets these zeros.
+# (m, n − m) with digit z(m) on the left and digit s − z(m) on the right.  That is at most two before the first
+# digit, where zeros are.  Digits of a left side beyond its last one then meet these zeros.
 
 
 _HEAD = 6
 """log2 of the unit before the first digit: L and R are at most half of it, and y a quarter."""
 _BEHIND = 6
-"""Digits go on for so many bits behind the unit of the last word."""
+"""Bits of digits below the unit of the last word."""
 _BEFORE = 2
 
 
@@ -389,19 +389,19 @@ class DigitRows(Rows):
         code.call(self.kernels[0], arguments)
         return self._words([code.load(self.sums, LANES * k) for k in range(count + 1)])
 
-    def _level(self, n: Operand, most: Operand) -> Operand:
-        """s; where some z(m) exceeds s + 2, it counts as s + 2, so that s is looked for again."""
+    def _level(self, n: Operand, largest_zeros: Operand) -> Operand:
+        """s; where some z(m) exceeds s + 2, it is set to s + 2, and s is computed again."""
         code, b = self.code, self.code.builder
         before, search = b.block, b.append_basic_block("level")
         b.branch(search)
         b.position_at_end(search)
         largest = code.phi(INT)
-        code.add_incoming([largest], [most], before)
+        code.add_incoming([largest], [largest_zeros], before)
         half = (n >> 1) + 1
 
         def lower(m: Operand, values: list[Operand]) -> list[Operand]:
-            one, other = (code.load_one(self.places, k) for k in (m, n - m))
-            return [code.smaller(values[0], one + other)]
+            zeros_left, zeros_right = (code.load_one(self.places, k) for k in (m, n - m))
+            return [code.smaller(values[0], zeros_left + zeros_right)]
 
         level = code.loop(0, half, lower, [code.integer(digits_of(self.grid))])[0]
         limit = level + _BEFORE
@@ -423,14 +423,14 @@ class DigitRows(Rows):
         code, grid, count = self.code, self.grid, digits_of(self.grid)
         digits: list[Any] = [None] * count
         for k, word in enumerate(words):
-            rest = _times(code, word, _raised(grid))
+            remainder = _times(code, word, _raised(grid))
             for j in range(max(0, (_HEAD + grid.bits * k + BITS - 2) // BITS - 1), count):
                 exact = self._place(j) <= -grid.bits * (k + 1) and k + 1 < grid.words
-                piece = rest if exact else rounded(code, rest, self._place(j) + _raised(grid))
+                piece = remainder if exact else rounded(code, remainder, self._place(j) + _raised(grid))
                 digits[j] = piece if digits[j] is None else digits[j] + piece
                 if exact:
                     break
-                rest -= piece
+                remainder -= piece
         carries = [None, *(rounded(code, d, self._place(j) + _raised(grid)) for j, d in enumerate(digits[1:])), None]
         carried = [self._carried(*three) for three in zip(digits, carries, carries[1:], strict=False)]
         return [_times(code, digit, -self._place(j) - _raised(grid)) for j, digit in enumerate(carried)]
@@ -449,19 +449,19 @@ class DigitRows(Rows):
         words: list[Any] = [None] * grid.words
         for index in reversed(range(len(sums))):
             unit = 2 * _HEAD - BITS * (index + 1)
-            rest = _times(code, sums[index], unit + _raised(grid))
+            remainder = _times(code, sums[index], unit + _raised(grid))
             for k in range(min(grid.words - 1, max(0, (3 - unit - SUM_BITS) // grid.bits)), grid.words):
                 exact = k == grid.words - 1 or unit + grid.bits * (k + 1) >= 0
-                piece = rest if exact else rounded(code, rest, _raised(grid) - grid.bits * (k + 1))
+                piece = remainder if exact else rounded(code, remainder, _raised(grid) - grid.bits * (k + 1))
                 words[k] = piece if words[k] is None else words[k] + piece
                 if exact:
                     break
-                rest -= piece
+                remainder -= piece
         return [code.zero if word is None else _times(code, word, -_raised(grid)) for word in words]
 
 
 def _raised(grid: Grid) -> int:
-    """Numbers are split times 2 to the power of this, where digits are small beside the range of doubles."""
+    """log2 of a factor of the numbers to be split, where digits are near the underflow of doubles."""
     return 500 if grid.total > 800 else 0
 
 
@@ -522,8 +522,8 @@ class WordRows(Rows):
         code.loop(zeros, zeros_after, begin, [])
         folded: list[Operand] = []
         for v in range(self.vectors):
-            one, wide = self._folded(y[words * v : words * (v + 1)], zeros_after, wide)
-            folded += one
+            words_of_vector, wide = self._folded(y[words * v : words * (v + 1)], zeros_after, wide)
+            folded += words_of_vector
         self._put(n, folded)
         return folded, zeros_after, wide
 
@@ -579,7 +579,7 @@ class WordRows(Rows):
         code.loop(0, lefts[1] + 1, left, [])
 
     def end_sums(self) -> list[Operand]:
-        """S as K words, not carried, after a look at each."""
+        """S as K words, not carried, after a check of each."""
         code, words, seen = self.code, self.grid.words, self.seen
         sums = [code.load(self.sums, 8 * k) for k in range(words)]
         watched = Accumulator(code, self.grid, 0, sums, code.load(seen, 0).bits())
@@ -604,7 +604,7 @@ class WordRows(Rows):
         b.position_at_end(end)
 
     def _leading_zeros(self, y: list[Operand], before: Operand) -> Operand:
-        """How many leading words are 0 in every lane, all but the last at most; never fewer than before."""
+        """The number of leading words that are 0 in every lane, at most all but the last, at least ``before``."""
         code, words = self.code, self.grid.words
         count, only = code.integer(0), code.true
         for k in range(words - 1):
@@ -616,7 +616,7 @@ class WordRows(Rows):
         return code.larger(count, before)
 
     def _folded(self, y: list[Operand], zeros: Operand, wide: Operand) -> tuple[list[Operand], Operand]:
-        """Words that count as 0 and are not: added to the first that does not."""
+        """The words with those that count as 0 but are not added to the first that does not."""
         code = self.code
         folded, left = [], code.zero
         for k, word in enumerate(y):

@@ -1,8 +1,8 @@
 """One Taylor step on a grid of K words: the function ``series``.
 
-Coefficients carry h^n, so that the step is a sum.  What has become 0 in all lanes is skipped, which is most of the
-speed: :mod:`heavytop.multiword.fixed_point.products` and :mod:`heavytop.multiword.fixed_point.products` keep
-coefficients and sum their products. The series ends where two coefficients in a row are below
+Coefficients include h^n, so that the step is a sum.  Words that have become 0 in all lanes are skipped, saving most
+of the time: :mod:`heavytop.multiword.fixed_point.products` stores coefficients and sums their products.  The series
+ends where two successive coefficients are below
 :attr:`heavytop.multiword.fixed_point.arithmetic.Grid.smallest`.
 """
 
@@ -44,18 +44,18 @@ from heavytop.multiword.fixed_point.products import DigitRows, ProductSize, Rows
 from heavytop.top.equations import System
 
 FIRED, UNSETTLED = -1, -2
-"""The result of ``series`` in place of its number of orders: a sum left its range; no convergence."""
+"""Results of ``series`` other than its number of orders: a sum left its range; no convergence."""
 _WIDEST_DIVIDEND = 53
-"""Bits of a word that is divided, behind the first."""
+"""Bits of a divided word after the first."""
 _NONE = 8
 """A lane of the second operand of a shuffle, which is 0."""
 _HALVES = (0, 1, 2, *[_NONE] * 5), (3, 4, 5, *[_NONE] * 5)
 _FEWEST_WORDS = 8
-"""With so many words, products are summed in digits: with seven and fewer that is slower (measured)."""
+"""From so many words on products are summed in digits; with seven and fewer that is slower (measured)."""
 
 
 def rows_of(grid: Grid) -> type[Rows]:
-    """How products are summed on this grid."""
+    """The implementation of sums of products on this grid."""
     return DigitRows if grid.bounded and grid.words >= _FEWEST_WORDS else WordRows
 
 
@@ -109,9 +109,9 @@ class SeriesCode:
         quiet = (bits == 0) & (code.largest(wide) < 1)
         settled = small >= 2
         for v in range(self.vectors):
-            one = total[words * v : words * (v + 1)]
-            one = carried(code, self.grid, carried(code, self.grid, one))
-            for k, word in enumerate(one):
+            vector_sum = total[words * v : words * (v + 1)]
+            vector_sum = carried(code, self.grid, carried(code, self.grid, vector_sum))
+            for k, word in enumerate(vector_sum):
                 code.store(word, result, 8 * (words * v + k))
         count = code.select(settled, orders, UNSETTLED)
         b.ret(code.select(quiet, count, FIRED))
@@ -132,23 +132,23 @@ class SeriesCode:
             return (n < most_orders(self.grid)) & (small < 2)
 
         def body(n: Operand, zeros: Operand, small: Operand, wide: Operand, *vectors: Operand) -> list[Operand]:
-            y, total, rest = list(vectors[:count]), vectors[count : 2 * count], vectors[2 * count :]
+            y, total, rounding_errors = list(vectors[:count]), vectors[count : 2 * count], vectors[2 * count :]
             after = n + 1
             status, wide = self._order(n, zeros, wide, y)
-            following, zeros, wide = self.rows.keep(after, status, zeros, wide)
-            size = self.rows.largest_sum(following)
+            y_next, zeros, wide = self.rows.keep(after, status, zeros, wide)
+            size = self.rows.largest_sum(y_next)
             small = code.select(size <= self.grid.smallest, small + 1, 0)
-            sums = [a + c for a, c in zip(total, following, strict=True)]
-            lost = []
-            for k, before in zip(floating, rest, strict=True):
-                sums[k], error = code.two_sum(total[k], following[k])
-                lost.append(before + error)
-            return [after, zeros, small, wide, *following, *sums, *lost]
+            sums = [a + c for a, c in zip(total, y_next, strict=True)]
+            errors = []
+            for k, before in zip(floating, rounding_errors, strict=True):
+                sums[k], error = code.two_sum(total[k], y_next[k])
+                errors.append(before + error)
+            return [after, zeros, small, wide, *y_next, *sums, *errors]
 
         n, _, small, wide, *vectors = code.as_long_as(wanted, body, begin)
         total = vectors[count : 2 * count]
-        for k, lost in zip(floating, vectors[2 * count :], strict=True):
-            total[k] = total[k] + lost
+        for k, error in zip(floating, vectors[2 * count :], strict=True):
+            total[k] = total[k] + error
         return n, small, wide, total
 
     def _order(self, n: Operand, zeros: Operand, wide: Operand, y: list[Operand]) -> tuple[list[Operand], Operand]:
@@ -226,7 +226,7 @@ class SeriesCode:
         return gathered
 
     def _raised(self, words: list[Operand], wide: Operand) -> tuple[list[Operand], Operand]:
-        """Multiplied by 16 as often as is asked; seldom at all."""
+        """The words multiplied by 16 as often as requested, which is rare."""
 
         def once(_: Operand, values: list[Operand]) -> list[Operand]:
             products = [word * 16.0 for word in values[:-1]]
@@ -239,7 +239,7 @@ class SeriesCode:
         return values[:-1], values[-1]
 
     def _times(self, words: list[Operand]) -> list[Operand]:
-        """Each word times the factor, rounded to its grid; what is left goes to the next, exactly."""
+        """Each word times the factor, rounded to its grid; the exact remainder is added to the next."""
         code, products, left = self.code, [], None
         factor = code.spread(self.code.arguments[7])
         for k, word in enumerate(words):
@@ -251,7 +251,7 @@ class SeriesCode:
         return products
 
     def _divided(self, n: Operand, words: list[Operand], wide: Operand) -> tuple[list[Operand], Operand]:
-        """Divided by n + 1, digit by digit: each remainder is exact and goes to the next word."""
+        """The words divided by n + 1, digit by digit; each remainder is exact and is added to the next word."""
         code = self.code
         after = (n + 1).to_double()
         divisor, inverse = code.spread(after), code.spread(code.load_one(self.code.arguments[2], n))
@@ -270,7 +270,7 @@ class SeriesCode:
 
 # The polynomial of a step on a grid of K words, at times inside the step: the function ``samples``.
 #
-# Horner's scheme Σ y_n x^n with x = (t − t_0)/h from 0 to 1, for the coefficients y_n h^n that the step has left.  Its
+# Horner's scheme Σ y_n x^n with x = (t − t_0)/h from 0 to 1, for the coefficients y_n h^n of the step.  Its
 # products are those of :func:`heavytop.multiword.fixed_point.arithmetic.bounded_product`: x is the smaller factor, and
 # a partial sum may be :func:`most_of` at most, which is watched.
 
@@ -282,7 +282,7 @@ _PARTS = 5
 
 
 def most_of(grid: Grid) -> float:
-    """The largest partial sum: with words of more than 46 bits its products with x leave their range earlier."""
+    """The bound of partial sums: with words of more than 46 bits their products with x leave the range earlier."""
     return float(2.0 ** min(4, _SUM_BITS - grid.bits))
 
 
@@ -300,8 +300,8 @@ def write_samples(module: ir.Module, grid: Grid, vectors: int) -> ir.Function:
     made, code = function(module, "samples", ir.VoidType(), [POINTER, INT, POINTER, INT, INT, POINTER])
     coefficients, order, at, first, last, result = code.arguments
     words, null = grid.words, code.null
-    count = max(1, _WORDS_AT_ONCE // words)  # of few words the operations of one sample wait for each other
-    kept = rows_of(grid)(code, grid, vectors, most_orders(grid) + 2, coefficients, null, null, null, [])
+    count = max(1, _WORDS_AT_ONCE // words)  # with few words the operations of one sample depend on each other
+    stored = rows_of(grid)(code, grid, vectors, most_orders(grid) + 2, coefficients, null, null, null, [])
     width = words * vectors + 1
 
     def several(block: Operand, _: list[Operand]) -> None:
@@ -311,7 +311,7 @@ def write_samples(module: ir.Module, grid: Grid, vectors: int) -> ir.Function:
         x = [[code.spread(code.load_one(start, k)) for k in range(words)] for start in starts]
 
         def term(zeros: int, k: Operand, values: list[Operand]) -> list[Operand]:
-            rows, results = [kept.stored(order - k, v) for v in range(vectors)], []
+            rows, results = [stored.stored(order - k, v) for v in range(vectors)], []
             for i in range(count):
                 sums, largest = [], values[width * (i + 1) - 1]
                 for v, row in enumerate(rows):
@@ -328,7 +328,7 @@ def write_samples(module: ir.Module, grid: Grid, vectors: int) -> ir.Function:
             leading = [code.absolute(value) for begin in begins for value in values[begin : begin + zeros]]
             return ~code.any_of(reduce(code.larger, leading) > 0)
 
-        # as long as leading words of the sums are 0, products with them are passed over: high orders are small
+        # while leading words of the sums are 0, products with them are skipped: high orders are small
         k, values = code.integer(0), [code.zero] * (width * count)
         for zeros in reversed(range(0, words, -(-words // _PARTS))):
             holds = partial(vanish, zeros) if zeros else None
@@ -348,7 +348,7 @@ def write_samples(module: ir.Module, grid: Grid, vectors: int) -> ir.Function:
 #
 # A step that takes more than 0.53 K b orders is followed by one of half its length, one that takes fewer than 0.34 K b
 # by one of twice its length where the time is a multiple of that.  A step that does not converge, or in which a sum
-# left its range, is done again with half its length; where that goes on, the run ends.
+# left its range, is repeated with half its length; after too many halvings the run ends.
 
 
 TIME, TARGET, BEGAN, SIGN, CLOCK = range(5)
@@ -367,10 +367,10 @@ def build(
     ``series`` alone.
 
     advance(state, constants, inverses, rows, sums, places, seen, result, clock, counts, steps): at most so many steps,
-    until the time covers the target; gives their number.  Behind the result lies the state before the last step.
+    until the time reaches the target; returns their number.  The state before the last step follows the result.
     follow(those of advance but steps, times, at, progress, count, steps, samples): steps, and ``samples`` of the times
-    that they cover, doubles > 0, until all are or so many steps are taken.  at: room for the K words of each.
-    progress: times and steps done; it ends, too, at a time that takes exact numbers, or whose sum leaves its range.
+    that they cover, doubles > 0, up to the last time or so many steps.  at: room for the K words of each.
+    progress: times and steps done; it also ends at a time that needs exact numbers, or whose sum leaves its range.
     """
     module = ir.Module("grid")
     series = SeriesCode(module, grid, system, 2 if attitude else 1, (processor or Processor.here()).wide)
@@ -398,14 +398,14 @@ class _Advance(Stepping):
         return self.time(TIME) >= self.time(TARGET)
 
     def write_step(self) -> Operand:
-        """One step; whether it stands."""
+        """Write one step; returns whether it is accepted."""
         code, b = self.code, self.code.builder
         halvings = self.count(HALVINGS)
         length = _power(halvings)
         exponent = self.count(EXCESS) - halvings
         raises = code.larger((exponent + 3) >> 2, 0)
-        rest = (raises << 2) - exponent
-        factor = self.time(SIGN) * _power(rest)
+        shift = (raises << 2) - exponent
+        factor = self.time(SIGN) * _power(shift)
         orders = code.call(self.series, [*self.scratch, factor, raises, self.result])
         good = orders >= 0
         time = self.time(TIME)
@@ -434,8 +434,8 @@ class _Advance(Stepping):
         aligned = quotient == quotient.to_integer().to_double()
         longer = good & aligned & (orders <= few) & (halvings > self.count(FEWEST))
         shorter = ~good | (orders > many)
-        following = self.code.select(shorter, halvings + 1, halvings)
-        self.set_count(self.code.select(longer, halvings - 1, following), HALVINGS)
+        next_halvings = self.code.select(shorter, halvings + 1, halvings)
+        self.set_count(self.code.select(longer, halvings - 1, next_halvings), HALVINGS)
 
 
 class _Follow(Following):
@@ -457,15 +457,15 @@ class _Follow(Following):
 
     def put(self, done: Operand, head: Any, otherwise: Any) -> None:
         code = self.code
-        known = self._while(done, self.times_count, self._is_known)
+        exact_end = self._while(done, self.times_count, self._is_known)
         order = code.load_one(self.counts, ORDERS)
-        code.call(self.samples, [self.arrays[3], order, self.at, done, known, self.result])
-        good = self._while(done, known, self._is_in_range)
+        code.call(self.samples, [self.arrays[3], order, self.at, done, exact_end, self.result])
+        good = self._while(done, exact_end, self._is_in_range)
         code.store_one(good, self.progress, 0)
         code.builder.cbranch(good > done, head, otherwise)
 
     def _while(self, start: Operand, stop: Operand, holds: Callable[[Operand], Operand]) -> Operand:
-        """The first place from ``start`` on that ``holds`` does not, ``stop`` at the latest."""
+        """The first index from ``start`` on at which ``holds`` is false, at most ``stop``."""
 
         def wanted(index: Operand, so_far: Operand) -> Operand:
             return (index < stop) & so_far
@@ -477,23 +477,23 @@ class _Follow(Following):
         return self.code.as_long_as(wanted, body, [start, self.code.true])[0]
 
     def _is_known(self, index: Operand) -> Operand:
-        """Whether a time is in the last step and its words are exact, a bit; puts them.
+        """Whether a time is in the last step and its words are exact, a bit; stores them.
 
         time − began is exact where began is 0, or no more than time ≤ 2 began (Sterbenz); a step is a power of two.
         """
         code, grid = self.code, self.grid
         time, began, end = code.load_one(self.times, index), self.time(BEGAN), self.time(TIME)
-        rest = (time - began) / (end - began)
+        remainder = (time - began) / (end - began)
         near = time <= began + began
-        known = (time <= end) & (near | (began == 0))
+        is_exact = (time <= end) & (near | (began == 0))
         for k in range(grid.words):
-            digits = rest * (1 / grid.unit(k))
+            digits = remainder * (1 / grid.unit(k))
             low = code.floor(digits)
             above = digits - low >= 0.5
             word = (low + code.select(above, 1.0, 0.0)) * grid.unit(k)
             code.store_one(word, self.at, index * grid.words + k)
-            rest -= word
-        return known & (rest == 0)
+            remainder -= word
+        return is_exact & (remainder == 0)
 
     def _is_in_range(self, index: Operand) -> Operand:
         """Whether the partial sums of a sample were in their range, a bit."""
@@ -503,7 +503,7 @@ class _Follow(Following):
 
 
 def raises_of(exponent: int) -> tuple[float, int]:
-    """(factor, raises) with factor 16^raises = 2^exponent and factor at most 1, as ``advance`` takes them."""
+    """(factor, raises) with factor 16^raises = 2^exponent and factor at most 1, arguments of ``series``."""
     raises = max(0, (exponent + 3) >> 2)
     return 2.0 ** (exponent - 4 * raises), raises
 

@@ -1,8 +1,8 @@
 """Taylor coefficients of a motion of a quadratic field in integers, each rounded once.
 
 In units of 2^-precision, for steps h = 2^-halvings: b_{n+1} = round(h f_n/(n + 1)), where f_n needs every product
-b_j b_{n−j}.  Inside short blocks these are summed one by one; between blocks they are taken as products of polynomials
-with whole coefficients, as soon as both factors are known (relaxed multiplication; J. van der Hoeven, "Relax, but
+b_j b_{n−j}.  Inside short blocks these are summed one by one; between blocks they are products of polynomials
+with integer coefficients, as soon as both factors are known (relaxed multiplication; J. van der Hoeven, "Relax, but
 don't be too lazy", 2002).  All sums are exact, so the coefficients do not depend on the way they were summed.
 """
 
@@ -51,9 +51,9 @@ class QuadraticField(Protocol):
 def coefficients(
     motion: QuadraticField, centre: Sequence[int], precision: int, halvings: int
 ) -> list[list[mpz]] | None:
-    """b_0, b_1, ... of each component, up to two in a row that are within 2 units; None where they do not come to that.
+    """b_0, b_1, ... of each component, up to two successive ones within 2 units; None where the series is too long.
 
-    They should within 0.45 orders a bit; a step twice too long is abandoned at half an order a bit.
+    It should end within 0.45 orders per bit; a step twice too long is abandoned at half an order per bit.
     """
     longest = max(abs(value) for value in centre).bit_length() // 2 + 32
     series = _Series(motion, precision, precision + halvings, longest, [[mpz(value)] for value in centre])
@@ -66,7 +66,7 @@ def coefficients(
 
 @dataclass(slots=True)
 class _Series:
-    """values: what is known of each component.  between: of each row, the products that are already summed."""
+    """values: the known coefficients of each component.  between: the sums of products of each row so far."""
 
     motion: QuadraticField
     precision: int
@@ -97,9 +97,9 @@ class _Series:
         for n in range(low, high):
             sums = [self._within(y[j], y[k], low, n) for j, k in self.motion.pairs]
             last = [component[n] for component in y]
-            for component, row, known in zip(y, self.motion.rows, self.between, strict=True):
+            for component, row, before in zip(y, self.motion.rows, self.between, strict=True):
                 linear = sum((c * last[j] for c, j in row.linear), mpz(0))
-                numerator = sum((c * sums[pair] for c, pair in row.products), known[n] + (linear << self.precision))
+                numerator = sum((c * sums[pair] for c, pair in row.products), before[n] + (linear << self.precision))
                 divisor = mpz(row.denominator * (n + 1)) << self.shift
                 component.append((2 * numerator + divisor) // (2 * divisor))
             if n > 2 and all(-2 <= component[i] <= 2 for component in y for i in (-1, -2)):
@@ -108,12 +108,12 @@ class _Series:
 
     @staticmethod
     def _within(a: list[mpz], b: list[mpz], low: int, n: int) -> mpz:
-        """The products a_j b_{n−j} that no earlier block could know: j or n − j from ``low`` on."""
+        """The products a_j b_{n−j} that are new in this block: j or n − j from ``low`` on."""
         total = sum(map(mul, a[low:], reversed(b[: n - low + 1])), mpz(0))
         return total if low == 0 else total + sum(map(mul, b[low:], reversed(a[: n - low + 1])))
 
     def _multiply(self, low: int, middle: int, high: int) -> None:
-        """Add the products of b_low..b_{middle−1} with all known ones, as far as they reach middle ≤ n < high."""
+        """Add the products of b_low..b_{middle−1} with all known ones to the sums of middle ≤ n < high."""
         length = high - low
         used = {index for pair in self.motion.pairs for index in pair}
         new = {i: fmpz_poly([int(v) for v in self.values[i][low:middle]]) for i in used}
@@ -121,8 +121,8 @@ class _Series:
         products = [new[j].mul_low(first[k], length) for j, k in self.motion.pairs]
         if low > 0:
             products = [
-                known + first[j].mul_low(new[k], length)
-                for known, (j, k) in zip(products, self.motion.pairs, strict=True)
+                product + first[j].mul_low(new[k], length)
+                for product, (j, k) in zip(products, self.motion.pairs, strict=True)
             ]
         for row, between in zip(self.motion.rows, self.between, strict=True):
             total = sum((c * products[pair] for c, pair in row.products), fmpz_poly([]))
@@ -130,7 +130,7 @@ class _Series:
                 between[n] += int(value)
 
 
-# One motion in integers of any length: what goes on where the words of a double end.
+# One motion in integers of any length, for precisions beyond those of words.
 #
 # A number of p bits is an integral multiple of 2^-p, the ulp; coefficients are made by
 # the code above, and h is a power of two, halved and doubled by the number of orders
@@ -179,13 +179,13 @@ def field_of(problem: Scaled, forwards: bool) -> _Field:
 def _linear(problem: Scaled, component: int) -> dict[int, Fraction]:
     """Component -> coefficient, of the linear part of one component's rate."""
     first = component < 6
-    lane, own = (component, 0) if first else (component - 3, 3)
+    lane, offset = (component, 0) if first else (component - 3, 3)
     terms: dict[int, Fraction] = {}
     table = problem.coefficients.vectors[0 if first else 1][1:]
     for row, permutation in zip(table, permutations(problem.system), strict=True):
         source, c = permutation[lane], row[lane]
         if c and source != ZERO:
-            terms[source + own] = terms.get(source + own, Fraction(0)) + c
+            terms[source + offset] = terms.get(source + offset, Fraction(0)) + c
     return terms
 
 
@@ -234,7 +234,7 @@ class IntegerMotion(ResumableRun):
         return Status.OK
 
     def _step(self) -> bool:
-        """One step; False where no length will do."""
+        """Take one step; False where no length converges."""
         for halvings in range(self._halvings, _MOST_HALVINGS):
             series = coefficients(self.field, self._state, self.bits, halvings)
             if series is not None:
