@@ -37,7 +37,7 @@ def test_making_the_lattice(benchmark, room):
 
     def make():
         with working_precision(320):
-            return room._lattice.__wrapped__(motion, 320)
+            return room._lattice.__wrapped__(motion)
 
     lattice = benchmark(make)
-    benchmark.extra_info["radius"] = radius_text(radius(lattice.rate))
+    benchmark.extra_info["radius"] = radius_text(radius(getattr(lattice, "swing", lattice).rate))

@@ -39,8 +39,10 @@ from heavytop.exact.cases.euler import Euler
 from heavytop.exact.cases.gyrostat import Gyrostat
 from heavytop.exact.cases.lagrange import Lagrange
 from heavytop.exact.cases.pendulum import Pendulum
+from heavytop.exact.closed_form import balls
 from heavytop.exact.flint.balls import midpoint, radius, radius_text, working_precision
 from heavytop.measure.certify import bits_of
+from heavytop.precision import dot
 from heavytop.top.heavy_top import HeavyTop, State
 
 F = Fraction
@@ -93,10 +95,13 @@ class Functions:
 class OnPendulum:
     def __init__(self, motion, user, bits):
         with working_precision(bits):
-            made = pendulum._lattice.__wrapped__(motion, bits)
-        self.functions = Functions(user, number(made.functions.parameter))
-        self.rate, self.origin, self.amplitude = map(number, (made.rate, made.origin, made.amplitude))
-        self.half, self.axis, self.rotating = [number(h) for h in made.half], made.axis, made.rotating
+            made = pendulum._lattice.__wrapped__(motion)
+        swing = made.swing
+        self.functions = Functions(user, number(swing.functions.parameter))
+        self.rate, self.origin, self.amplitude = map(number, (swing.rate, swing.origin, swing.amplitude))
+        self.half, self.rotating = [number(h) for h in made.half], swing.rotating
+        (self.axis,) = (k for k, component in enumerate(made.axis) if not component.is_zero())
+        self.direction = number(made.axis[self.axis])
         self.gamma = [number(g) for g in motion.start.gamma]
 
     def state(self, time):
@@ -105,11 +110,11 @@ class OnPendulum:
         sine = self.amplitude * sn
         c = cosine * self.half[0] + sine * self.half[1]
         s = sine * self.half[0] - cosine * self.half[1]
-        cosine, sine = c * c - s * s, 2 * c * s
+        cosine, sine = c * c - s * s, 2 * c * s * self.direction
         k = self.axis
         i, j = (k + 1) % 3, (k + 2) % 3
         omega, gamma = [mp.zero] * 3, list(self.gamma)
-        omega[k] = -2 * self.rate * self.amplitude * speed
+        omega[k] = -2 * self.rate * self.amplitude * speed * self.direction
         gamma[i], gamma[j] = cosine * gamma[i] - sine * gamma[j], sine * gamma[i] + cosine * gamma[j]
         return [*omega, *gamma]
 
@@ -117,12 +122,13 @@ class OnPendulum:
 class OnEuler:
     def __init__(self, motion, user, bits):
         with working_precision(bits):
-            made = euler._lattice.__wrapped__(motion, bits)
+            made = euler._lattice.__wrapped__(motion)
             wave, angle = made.wave.at(made.origin)
-            began = number(made.gamma[1] * wave) * mp.expj(number(angle))
+            share, projection, across = (dot(balls(motion.start.gamma), axis) for axis in made.frame)
+            began = number(acb(projection, -across) * made.turn * wave) * mp.expj(number(angle))
         self.axes, self.user = made.axes, user
         self.functions = Functions(user, number(made.functions.parameter))
-        constants = made.rate, made.origin, made.drift, made.wave.shift, made.gamma[0]
+        constants = made.rate, made.origin, made.drift, made.wave.shift, share
         self.rate, self.origin, self.drift, self.shift, self.share = map(number, constants)
         self.amplitudes = {axis: number(a) for axis, a in made.amplitudes.items()}
         self.shares = [number(share) for share in made.shares]
@@ -235,7 +241,7 @@ class OnLattice:
 class OnLagrange:
     def __init__(self, motion, user, bits):
         with working_precision(bits):
-            made = lagrange._prepared.__wrapped__(motion, bits)
+            made = lagrange._prepared.__wrapped__(motion)
         self.lattice, self.spin, self.user = OnLattice(made, [made.horizontal], user), number(made.spin), user
         n, self.momentum, self.area, _, square = map(number, motion.constants)
         i1 = self.i1 = number(motion.top.inertia[0])
@@ -276,7 +282,7 @@ class OnLagrange:
 class OnGyrostat:
     def __init__(self, motion, user, bits):
         with working_precision(bits):
-            made = gyrostat._prepared.__wrapped__(motion, bits)
+            made = gyrostat._prepared.__wrapped__(motion)
         self.lattice = OnLattice(made, [made.momentum, made.gamma.waves], user)
         self.inertia = [number(i) for i in motion.top.inertia]
         self.share, self.turn, self.square = map(number, (made.gamma.share, made.gamma.turn, made.gamma.square))
