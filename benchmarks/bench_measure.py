@@ -25,7 +25,7 @@ TIMES = [Fraction(i, 64) for i in range(1, 257)]
 def measure_all(measure, run) -> None:
     for time, state in zip(run.times, run.states, strict=True):
         measure(time, state)
-    measure.settle()
+    measure.flush()
 
 
 @pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)

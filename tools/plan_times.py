@@ -29,7 +29,7 @@ PARTS = {
         "integrate.heyoka.motions:propagate",
     ),
     "truth": ("measure.truth:truth", "measure.truth:uncertified", "measure.truth:reference", "measure.truth:certified"),
-    "scoring": ("measure.scorer:Scorer.__call__", "measure.scorer:Drift.settle", "measure.scorer:summarise"),
+    "scoring": ("measure.scorer:Scorer.__call__", "measure.scorer:Drift.flush", "measure.scorer:flush_together"),
     "noise": ("measure.rounding_noise:Reruns._of",),
 }
 WHOLE = ("noise",)

@@ -39,7 +39,7 @@ def with_explanation(row: Row, task: Task, run: Trajectory, scorer: Scorer) -> R
     """
     if task.integrator.own or run.outcome is not Outcome.SUCCESS or not len(run.states) or scorer.error is None:
         return row
-    parts = [scorer.error.running[part].maximum for part in ("omega", "gamma")]
+    parts = [scorer.error.running[part].sums.maximum for part in ("omega", "gamma")]
     error = max((float(part) for part in parts if part.is_finite()), default=0.0)
     if error <= FAR:
         return row

@@ -18,8 +18,9 @@ from heavytop.exact.flint.balls import ball, working_precision
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure import scorer as scoring
+from heavytop.measure.bounded_doubles import BoundedDoubles
 from heavytop.measure.scalar import metric, of_fraction, root, text, to_ball, to_balls
-from heavytop.measure.scorer import Drift, Rough, Scorer, SolutionError, split
+from heavytop.measure.scorer import Drift, Scorer, SolutionError, split
 from heavytop.measure.truth import Truth, closed_form
 from heavytop.multiword.pairs import Pairs
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, exact, number, real
@@ -128,7 +129,7 @@ def test_many_states_at_once_have_the_drift_of_exact_fractions(monkeypatch, prec
     )
     rows = near_the_start(problem, 300, random)
     counted, drift = balls_counted(monkeypatch), Drift(problem, problem.integrals())
-    drift.take_array(rows)
+    drift.add_states(rows)
     metrics = drift.metrics()
     assert len(counted) < 30
     start, exact_rows = problem.start.flat, [[exact(value) for value in row] for row in rows]
@@ -155,7 +156,7 @@ def test_at_odd_scales_numbers_are_those_of_balls(monkeypatch, exponent: int) ->
         one_by_one(Fraction(1), row)
     expected = one_by_one.metrics()
     drift, counted = Drift(problem, problem.integrals()), balls_counted(monkeypatch)
-    drift.take_array(rows)
+    drift.add_states(rows)
     assert drift.metrics() == expected
     assert (len(counted) == 160) == (not -20 < exponent < 20)
 
@@ -226,10 +227,10 @@ def test_a_drift_that_doubles_do_not_resolve_is_evaluated_in_balls(monkeypatch: 
     problem = Problem.of(TOP, START, DOUBLE)
     rows = numpy.array([[float(value) for value in problem.start.flat]] * 160)
     same, broken = Drift(problem, problem.integrals()), Drift(problem, problem.integrals())
-    same.take_array(rows)
+    same.add_states(rows)
     assert {metric.value for metric in same.metrics().values()} <= {"0", "unresolved"}
     rows[7, 2] = numpy.nan
-    broken.take_array(rows)
+    broken.add_states(rows)
     assert broken.metrics()["drift_energy_rms"].value == "nan"
     assert broken.metrics()["drift_energy_final"].value in ("0", "unresolved")
 
@@ -369,7 +370,7 @@ def test_bounds_of_rough_numbers_hold_the_exact_ones() -> None:
         balls = [
             [arb(float(m), float(r)) for m, r in zip(*row, strict=True)] for row in zip(middles.T, radii.T, strict=True)
         ]
-    rough = Rough.of(balls)
+    rough = BoundedDoubles.of(balls)
     true = [
         [Fraction(m) + int(e) * Fraction(r) for m, e, r in zip(*row, strict=True)]
         for row in zip(middles, ends, radii, strict=True)
@@ -386,6 +387,6 @@ def test_bounds_of_rough_numbers_hold_the_exact_ones() -> None:
         assert numpy.isfinite(found.error).mean() > 0.9
         for value, error, a, b in zip(found.value, found.error, *true, strict=True):
             assert error == float("inf") or abs(Fraction(value) - rule(a, b)) <= Fraction(error)
-    narrow = Rough.of([[to_ball(3.0), to_ball(7.0)]])
+    narrow = BoundedDoubles.of([[to_ball(3.0), to_ball(7.0)]])
     assert float((narrow[0] / narrow[1]).error[0]) < 2.0**-51
-    assert Rough.of([[to_ball(0.0)]])[0].squared().error[0] == 0
+    assert BoundedDoubles.of([[to_ball(0.0)]])[0].squared().error[0] == 0

@@ -13,17 +13,9 @@ from flint import arb
 from heavytop.errors import InputError, quoted
 from heavytop.exact.flint.balls import FUNCTIONS, ball, whole_evaluation, working_precision
 from heavytop.integrate.trajectory import Problem
+from heavytop.measure.running import RunningStatistics, Statistics, Sums
 from heavytop.measure.scalar import GUARD_BITS, largest, relative_error, root
-from heavytop.measure.scorer import (
-    SOLUTION_ERROR,
-    Drift,
-    DriftAndError,
-    Running,
-    Scorer,
-    Statistics,
-    parameter_balls,
-    split,
-)
+from heavytop.measure.scorer import SOLUTION_ERROR, Drift, DriftAndError, Scorer, parameter_balls, split
 from heavytop.precision import Vector, cross, dot, exact
 from heavytop.records import Quantity
 from heavytop.top.attitude import SEQUENCES, Rows, matrix_of_quaternion, rotated, rows_of, rows_of_euler, transposed
@@ -200,7 +192,7 @@ class ObservedErrors(Statistics):
         self.form = next((form for form in FORMS if form in names), None)
         self.point = posed.centre if said.point is None else said.point
         self.distance_squared = dot(self.point, self.point)
-        self.running = {quantity: Running() for quantity in self._quantities(names)}
+        self.running = {quantity: RunningStatistics() for quantity in self._quantities(names)}
         self._last = 0.0
 
     def _quantities(self, names: Sequence[str]) -> list[Quantity]:
@@ -218,21 +210,28 @@ class ObservedErrors(Statistics):
             quantities += [Quantity(POSITION_ERROR, "relative")] if self.distance_squared else []
         return [*quantities, _WORST]
 
-    @whole_evaluation
     def __call__(self, time: Fraction, values: Values, state: Sequence[arb] | None) -> None:
-        """Take in one sample.  state: as :func:`state_of` finds it."""
-        true = self.truth.state(time, self.bits) if self.truth.covers(time) else None
-        if true is None:
+        """Add one sample.  state: of :func:`state_of`."""
+        if not self.truth.covers(time):
             return
+        sums, self._last = self._including(time, values, state)
+        for quantity, running in self.running.items():
+            running.update(sums[quantity], 1, {time: sums[quantity].final} if time in self.keep else {})
+
+    @whole_evaluation
+    def _including(
+        self, time: Fraction, values: Values, state: Sequence[arb] | None
+    ) -> tuple[dict[Quantity, Sums], float]:
+        """The sums of every error with this sample, and an upper bound of its largest error of a column."""
+        true = self.truth.state(time, self.bits)
         with working_precision(self.bits):
             errors = self._errors(values, true)
             if state is not None:
                 delta = [a - b for a, b in zip(state, true[:6], strict=True)]
                 along, across = split(delta, self.system.field(self.parameters, true[:6]))
                 errors |= {Quantity(SOLUTION_ERROR, "along"): along, Quantity(SOLUTION_ERROR, "across"): across}
-            for quantity, running in self.running.items():
-                running.take(time, running.following(errors[quantity]), time in self.keep)
-            self._last = float(errors[_WORST].abs_upper())
+            sums = {quantity: running.including([errors[quantity]]) for quantity, running in self.running.items()}
+            return sums, float(errors[_WORST].abs_upper())
 
     def last(self, rate: Fraction) -> float:
         """The largest error of a column in the last sample."""
@@ -288,12 +287,12 @@ class ObservedErrors(Statistics):
         part_of = length / ball(self.distance_squared).sqrt()
         return {Quantity(POSITION_ERROR): length, Quantity(POSITION_ERROR, "relative"): part_of, _WORST: part_of}
 
-    def quantities(self) -> dict[Quantity, Running]:
+    def quantities(self) -> dict[Quantity, RunningStatistics]:
         """The errors of the columns, by what they are of."""
         return self.running
 
-    def largest_alone(self, quantity: Quantity) -> bool:
-        """So of the relative error of all columns."""
+    def maximum_only(self, quantity: Quantity) -> bool:
+        """Whether it is the relative error of all columns."""
         return quantity == _WORST
 
 
@@ -311,6 +310,7 @@ def gives_state(names: Sequence[str]) -> bool:
     return ("omega" in names or ("omega_space" in names and attitude)) and ("gamma" in names or attitude)
 
 
+@whole_evaluation
 def state_of(values: Values, said: Convention, posed: Posed, bits: int) -> list[arb] | None:
     """Ω and γ in principal axes of a sample that gives both, else None; Ω of the body's axes before that of space."""
     if not gives_state(list(values)):
@@ -338,11 +338,15 @@ class JointViolation(Statistics):
     def __init__(self, bits: int, posed: Posed, said: Convention, keep: Sequence[Fraction]) -> None:
         self.bits, self.said, self.keep = bits, said, frozenset(keep)
         self.point = posed.centre if said.point is None else said.point
-        self.distances = Running()
+        self.distances = RunningStatistics()
+
+    def __call__(self, time: Fraction, values: Values) -> None:
+        """Add one sample."""
+        sums = self._including(values)
+        self.distances.update(sums, 1, {time: sums.final} if time in self.keep else {})
 
     @whole_evaluation
-    def __call__(self, time: Fraction, values: Values) -> None:
-        """Take in one sample."""
+    def _including(self, values: Values) -> Sums:
         with working_precision(self.bits):
             columns = {name: [ball(value) for value in part] for name, part in values.items()}
             position, pivot = columns["position"], [ball(value) for value in self.said.pivot]
@@ -352,9 +356,9 @@ class JointViolation(Statistics):
                 rows = self.said.upright(self.said.rotation(form, columns[form], ball_functions()))
                 arm = rotated(rows, [ball(value) for value in self.point])
                 off = [a - b for a, b in zip(off, arm, strict=True)]
-            self.distances.take(time, self.distances.following(root(dot(off, off))), time in self.keep)
+            return self.distances.including([root(dot(off, off))])
 
-    def quantities(self) -> dict[Quantity, Running]:
+    def quantities(self) -> dict[Quantity, RunningStatistics]:
         """``joint_violation``."""
         return {Quantity(JOINT_VIOLATION): self.distances}
 
@@ -386,9 +390,8 @@ class ObservedScorer(DriftAndError):
     def _parts(self) -> list[Statistics]:
         return [*super()._parts(), *([] if self.joint is None else [self.joint])]
 
-    @whole_evaluation
     def __call__(self, time: Fraction, values: Values) -> None:
-        """Take in one sample."""
+        """Add one sample."""
         state = state_of(values, self.said, self.posed, self.bits)
         if self.drift is not None and state is not None:
             self.drift(time, state)
@@ -404,7 +407,7 @@ ATTITUDE, POSITION = Quantity(ATTITUDE_ERROR), Quantity(POSITION_ERROR)
 class _AttitudeErrors(ObservedErrors):
     """Errors of the attitude and the position alone."""
 
-    def quantities(self) -> dict[Quantity, Running]:
+    def quantities(self) -> dict[Quantity, RunningStatistics]:
         """Both errors, that of the position relative too."""
         return {q: running for q, running in self.running.items() if q.name in (ATTITUDE_ERROR, POSITION_ERROR)}
 

@@ -22,8 +22,9 @@ from heavytop.integrate.registry import Integrator
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.attitude_error import ATTITUDE, POSITION
 from heavytop.measure.growth import Ensemble, band, law, root_mean_square
+from heavytop.measure.running import TimeText
 from heavytop.measure.scalar import RELATIVE, UNRESOLVED, of_fraction
-from heavytop.measure.scorer import SOLUTION_ERROR, Scorer, TimeText
+from heavytop.measure.scorer import SOLUTION_ERROR, Scorer
 from heavytop.measure.truth import EnsembleReference
 from heavytop.precision import Array, decimal_text, exact
 from heavytop.records import UNRESOLVED_SECONDS, Law, Metric, Quantity, Series

@@ -19,7 +19,7 @@ from msgspec.structs import replace as replace_struct
 
 from heavytop.integrate.registry import Integrator
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.measure.scorer import Scorer, summarise
+from heavytop.measure.scorer import Scorer, flush_together
 from heavytop.measure.truth import Truth, closed_form, uncertified
 from heavytop.precision import DOUBLE, exact, number, round_to
 from heavytop.records import Metric
@@ -162,7 +162,7 @@ class Reruns:
             problems.append(replace(problem, parameters=_each(p, partial(mul, scale))))
         scorers = [scorer(problem) for problem in problems]
         self.integrator.propagate_many(problems, times, lambda i, time, state: scorers[i](time, state), threads=1)
-        summarise(scorer.error for scorer in scorers if scorer.error is not None)
+        flush_together(scorer.error for scorer in scorers if scorer.error is not None)
         return scorers
 
 

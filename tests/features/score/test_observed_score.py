@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from flint import ctx
 
 import conventions
 import heavytop as ht
@@ -19,6 +20,7 @@ from heavytop.errors import InputError
 from heavytop.features.score.measurement import Assessment, assess
 from heavytop.features.score.text import to_json
 from heavytop.features.score.trajectories.files import read
+from heavytop.measure import attitude_error
 from heavytop.top.attitude import Attitude
 from heavytop.top.bodies import Body
 
@@ -64,6 +66,27 @@ def test_the_error_of_the_attitude_is_the_angle_and_that_of_the_position_a_lengt
     np.testing.assert_allclose(float(row.metrics["position_error_relative_max"]), expected, rtol=1e-6)
     assert set(row.series) >= {"attitude_error", "position_error"}
     assert not any(name.startswith("drift") for name in row.metrics)  # Ω is not there
+
+
+@pytest.mark.parametrize("part", ["attitude_angle", "root"])
+def test_a_sample_counts_once_however_often_it_is_evaluated(monkeypatch, part: str, tmp_path: Path) -> None:
+    """Another thread that sets FLINT's context makes an evaluation start again."""
+    _, q, omega = BODY
+    content = conventions.as_csv(off(1e-12), q, omega, Written(("quaternion", "position", "omega")))
+    expected = scored(content, tmp_path).row.metrics
+    original, calls = getattr(attitude_error, part), []
+    monkeypatch.setattr(ctx, "cap", ctx.cap)
+
+    def disturbed(*args: object) -> object:
+        result = original(*args)
+        calls.append(part)
+        if len(calls) % 5 == 1:
+            ctx.cap = 11 + len(calls)
+        return result
+
+    monkeypatch.setattr(attitude_error, part, disturbed)
+    assert scored(content, tmp_path).row.metrics == expected
+    assert len(calls) > 20
 
 
 def test_the_sign_of_a_quaternion_does_not_matter(tmp_path: Path) -> None:

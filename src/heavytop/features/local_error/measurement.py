@@ -28,8 +28,9 @@ from heavytop.integrate.peers.command import NOT_COUNTED
 from heavytop.integrate.peers.contract import DEFAULT_STEP
 from heavytop.integrate.registry import Integrator
 from heavytop.integrate.trajectory import Outcome, Problem, TaylorStep, Trajectory
+from heavytop.measure.running import RunningStatistics, Sums
 from heavytop.measure.scalar import GUARD_BITS, largest, metric, resolved, to_ball
-from heavytop.measure.scorer import OBSERVED_ORDER, Running, Sums
+from heavytop.measure.scorer import OBSERVED_ORDER
 from heavytop.precision import Precision, decimal_text, exact, number
 from heavytop.records import Metric, Quantity, by_name
 from heavytop.top.equations import System
@@ -64,24 +65,24 @@ class LocalError:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.bits = problem.precision.bits + GUARD_BITS
-        self.running = Running()
+        self.running = RunningStatistics()
         self.orders: list[float] = []
         self.calls: list[Call] = []
 
     def __call__(self, time: Fraction, step: TaylorStep | Call) -> None:
-        """Take in one step that ends at ``time``."""
+        """Add one step, which ends at ``time``."""
         p = self.problem
         begin = [exact(value) for value in step.start]
         truth = Validated(p.top, State(tuple(begin[:3]), tuple(begin[3:6])), p.system, p.parameters.rotor)
         beyond = (_NEAR, _FAR) if isinstance(step, TaylorStep) else step.further
         truths = {n: truth.state(n * exact(step.length), self.bits) for n in (1, *beyond)}
-        sums, order = self._following(step, truths, max(map(abs, begin)))
-        self.running.take(time, sums, keep=False)
+        sums, order = self._including(step, truths, max(map(abs, begin)))
+        self.running.update(sums)
         self.calls += [step] if isinstance(step, Call) else []
         self.orders += order
 
     @whole_evaluation
-    def _following(
+    def _including(
         self, step: TaylorStep | Call, truths: Mapping[int, Sequence[arb]], size: Fraction
     ) -> tuple[Sums, tuple[float, ...]]:
         """The sums of the errors with this step, and the order seen in it, if any."""
@@ -94,13 +95,17 @@ class LocalError:
             if len(seen) == 2:
                 near, far = seen
                 order = (float((gaps[far] / gaps[near]).log()) / log(far / near) - 1,)
-            return self.running.following(gaps[1] / scale), order
+            return self.running.including([gaps[1] / scale]), order
 
     @property
     def largest(self) -> Fraction:
         """The largest error of a step so far."""
         size = max(map(abs, self.problem.start.flat))
-        return (midpoint(self.running.maximum) + radius(self.running.maximum)) * self.problem.precision.eps * size
+        return (
+            (midpoint(self.running.sums.maximum) + radius(self.running.sums.maximum))
+            * self.problem.precision.eps
+            * size
+        )
 
     @whole_evaluation
     def metrics(self) -> dict[str, Metric]:

@@ -351,7 +351,7 @@ def drift(run: Trajectory) -> Drifts:
     computed = run.principal or run
     measure = Drift(run.problem, run.problem.integrals())
     carried = computed.attitude is not None
-    measure.take_array(numpy.hstack([computed.states, computed.attitude]) if carried else computed.states)
+    measure.add_states(numpy.hstack([computed.states, computed.attitude]) if carried else computed.states)
     return Drifts(_summaries(measure.metrics(), DRIFT))
 
 

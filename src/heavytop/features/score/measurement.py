@@ -24,6 +24,7 @@ from heavytop.harness.rows import Task, computed_row, data_of, seconds_a_step
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.attitude_error import FORMS, ObservedScorer
+from heavytop.measure.running import RunningStatistics, Sums
 from heavytop.measure.scalar import (
     GUARD_BITS,
     RELATIVE,
@@ -35,7 +36,7 @@ from heavytop.measure.scalar import (
     roundings,
     to_ball,
 )
-from heavytop.measure.scorer import SOLUTION_ERROR, DriftAndError, Running, Scorer, Sums
+from heavytop.measure.scorer import SOLUTION_ERROR, DriftAndError, Scorer
 from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE_DOUBLE, Precision, decimal_text, dot, exact, plain_decimal, round_to, time_text
 from heavytop.records import Metric, Peer, Quantity, Row, RowKey, Subject, by_name
@@ -370,19 +371,19 @@ def _peer(trajectory: GivenTrajectory, measured: Scored, count: int, progress: P
     precision, problem, known = trajectory.precision, measured.problem, measured.scorer.truth
     if isinstance(known, str) or not count or precision == DOUBLE_DOUBLE:
         return None
-    running, bits = Running(), precision.bits + GUARD_BITS
+    running, bits = RunningStatistics(), precision.bits + GUARD_BITS
     limit = max(1, int(_EFFORT / seconds_a_step(precision.bits)))
 
     @whole_evaluation
-    def following(time: Fraction, state: Sequence[object]) -> Sums:
+    def including(time: Fraction, state: Sequence[object]) -> Sums:
         true = known.state(time, bits)[: len(state)]
         with working_precision(bits):
             off = [to_ball(value) - ball for value, ball in zip(state, true, strict=True)]
-            return running.following(relative_error(off, true))
+            return running.including([relative_error(off, true)])
 
     def observe(time: Fraction, state: Sequence[object]) -> None:
         if known.covers(time):
-            running.take(time, following(time, state), False)
+            running.update(including(time, state))
         progress()
 
     top, start = problem.given or (problem.top, problem.start)

@@ -269,7 +269,7 @@ def _error(scorer: Scorer) -> Fraction | None:
     """The largest error over the samples, or what it is below; None without a reference."""
     if scorer.error is None:
         return None
-    parts = [scorer.error.running[part].maximum for part in ("omega", "gamma")]
+    parts = [scorer.error.running[part].sums.maximum for part in ("omega", "gamma")]
     return max(midpoint(part) + radius(part) for part in parts) if all(part.is_finite() for part in parts) else None
 
 
@@ -277,7 +277,7 @@ def _scored(task: Task, problem: Problem, run: Trajectory) -> Scorer:
     keep = [exact(number(time, problem.precision)) for time in task.keep]
     times = tuple(exact(number(time, problem.precision)) for time in task.times)
     scorer = Scorer(problem, _truth(problem, times), keep)
-    scorer.take(run.times, run.states)
+    scorer.add_states(run.times, run.states)
     return scorer
 
 
@@ -287,9 +287,9 @@ def _metrics(scorer: Scorer, sampled: bool) -> dict[Quantity, Metric]:
     metrics = {quantity: metric for quantity, metric in measures if quantity and quantity.statistic == "max"}
     if scorer.error is not None and sampled:
         omega, gamma = (scorer.error.running[part] for part in ("omega", "gamma"))
-        metrics[ERROR_FINAL] = metric(omega.final.max(gamma.final))
-        metrics[ERROR_MAX] = metric(omega.maximum.max(gamma.maximum))
-        metrics[RELATIVE] = metric(scorer.error.running["relative"].maximum)
+        metrics[ERROR_FINAL] = metric(omega.sums.final.max(gamma.sums.final))
+        metrics[ERROR_MAX] = metric(omega.sums.maximum.max(gamma.sums.maximum))
+        metrics[RELATIVE] = metric(scorer.error.running["relative"].sums.maximum)
     elif scorer.error is not None:
         metrics[ERROR_MAX] = _MISSING
     return metrics
