@@ -155,9 +155,9 @@ class Homoclinic(Kind):
             ["case", "format", "Ω error", "γ error", "drift", "escape |t|", "outcome"],
             both((row, _cells(row)) for row in rows),
             [
-                "Errors of Ω and γ: the largest over the samples with rate·|t| <= 10; drift: the largest of a first "
-                "integral, of all samples; escape: when Ω is first off by 1e-3 α. α: the "
-                "angular velocity of the rotation that the motion tends to; else the largest |Ωi| at the start.",
+                "Errors of Ω and γ: the largest over the samples with rate·|t| <= 10. Drift: the largest of any first "
+                "integral over all samples. Escape: when Ω is first off by 1e-3 α, where α is the angular velocity of "
+                "the rotation that the motion tends to, or else the largest |Ωi| at the start.",
                 NOISE_BAND,
             ],
         )

@@ -46,9 +46,10 @@ def survey_charts(sources: Sources, first: Iterable[str] = ()) -> Section | None
         "surveys",
         "Surveys of many motions",
         [
-            "A distribution is the fraction of the motions in each quarter of a decade. In the map a stronger colour "
-            "means fewer digits right (the median), white no motion. Each of the worst motions is drawn as the path of "
-            f"the vertical γ on the unit sphere in body axes, seen from (1, 1, 1), up to t = {drawn}; dashed behind.",
+            "Distributions show the fraction of motions in each quarter of a decade. In the map, a stronger colour "
+            "means fewer digits right (the median) and white means no motion. The worst motions are drawn as paths "
+            f"of the vertical γ on the unit sphere in body axes, seen from (1, 1, 1), up to t = {drawn}; dashed on "
+            "the far side.",
         ],
         columns=["sweep", "motion", "outcome", "error", "digits right", "inertia", "P", "r", "Ω", "γ", "command"],
         across=2,

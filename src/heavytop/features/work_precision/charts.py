@@ -59,13 +59,13 @@ def work_precision(sources: Sources, first: Iterable[str] = ()) -> Section | Non
         "work-precision",
         "Work and precision",
         [
-            "Seconds of a run, the fastest of several, since other work on the machine only ever adds, against its "
-            "error, the largest of a component over the samples, compared with the known motion: the lower and the "
-            "farther left, the better. A curve is one integrator over its tolerances or steps; the time to compile is "
-            "apart, in the numbers. A cross on the right edge is a run aborted before the end, at the time it "
-            "took: it has no error. heyoka:constants has the numbers of the top compiled into its code; heyoka with "
-            "general code, and the others, are given them when they run. heyoka:lanes runs eight motions side by side; "
-            "its time is an eighth of theirs, and is in no ranking.",
+            "Run time against error: the fastest of several runs, because other work on the machine only adds time, "
+            "and the largest error of a component over the samples, compared with the known motion. Lower and "
+            "farther left is better. Each curve is one integrator over its tolerances or steps; compile times are in "
+            "the numbers. A cross on the right edge is a run that was aborted, at the time it took: it has no error. "
+            "heyoka:constants has the parameters of the top compiled into its code; heyoka with general code and the "
+            "other integrators receive them at run time. heyoka:lanes runs eight motions side by side; its time is "
+            "an eighth of the total, and it is not ranked.",
         ],
         answers=Table("Seconds that heyoka and the best of the others take for an error", _LEADS, cells)
         if cells
@@ -303,12 +303,12 @@ def method_growth(sources: Sources, first: Iterable[str] = ()) -> Section | None
         "method-growth",
         "Growth by method",
         [
-            f"{clip(chosen[0][1].case)}: a splitting, which preserves structure, beside two methods that do not, each "
-            "at the tolerance or step whose error is nearest to 1e-5.",
-            "Dashed, with its exponent at its end: a power of t through the largest error so far, by least squares on "
-            "the last two decades of t; in the numbers that of each half too. A law is named where the halves agree, "
-            "and only where the error is ten times what rounding may have made: below, the exponent of one motion is "
-            "chance.",
+            f"{clip(chosen[0][1].case)}: a splitting, which preserves structure, and two methods that do not, each at "
+            "the tolerance or step whose error is nearest to 1e-5.",
+            "Dashed lines, labelled with their exponents, are powers of t fitted to the largest error so far by least "
+            "squares on the last two decades of t; the numbers give the exponent of each half too. A law is named only "
+            "where the halves agree and the error is ten times what rounding may have caused: below that, the exponent "
+            "of a single motion is chance.",
         ],
         columns=["integrator", "error on the way", "quantity", "last |t|", "last value", "exponent", "law"],
         across=2,

@@ -112,11 +112,11 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         "growth",
         "Errors over time",
         [
-            "Each error in units of ε = 2^(1 − bits) of its own format, so that all formats share one scale: 10⁶ means "
-            "that six digits are lost. Of the first integrals the one that drifts farthest at any sample is drawn. One "
-            "that holds does not prove that the motion is right: the distance from the true motion stands beside it.",
-            "A shade around a curve is the interval in which rounding noise alone moves it. Where no integrator is "
-            "named it is heyoka.",
+            "Errors are in units of ε = 2^(1 − bits) of the format, so that all formats share one scale: 10⁶ means "
+            "that six digits are lost. The first integral with the largest drift is drawn. A conserved integral does "
+            "not prove the trajectory correct, so the distance from the true motion is shown next to it.",
+            "A shaded band is the range over which rounding noise alone moves a curve. A curve without the name of an "
+            "integrator is heyoka's.",
         ],
         columns=["case", "run", "quantity", "largest", "last |t|", "last", "law", "exponent", "digits gone at |t|"],
         place=30,
@@ -137,10 +137,10 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     if _FITTED.label in section.legend:
         section.legend[_FITTED.label] = section.legend.pop(_FITTED.label)
         section.notes.append(
-            "Dashed, and in words at its end: the fitted law of growth with its exponent over the span that was "
-            "fitted; the shade around a dashed line is its 95 % interval. The rate of an exponential is the median "
-            "over the starts; the root mean square follows the fastest of them. Digits are gone where the root mean "
-            "square is a tenth of the motion's size, reached or by the law."
+            "Dashed lines are fitted growth laws, drawn over the times of the fit and labelled with their exponents; "
+            "the band around one is its 95 % interval. The rate of an exponential is the median over the starts; the "
+            "root mean square follows the fastest of them. All digits are lost where the root mean square reaches a "
+            "tenth of the motion's size, or does so by the law."
         )
     return section
 
@@ -295,10 +295,11 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         "digits",
         "Digits right",
         [
-            "Digits right at every sample up to a time: −log10 of the largest |error|/max(1, |true value|) of a "
-            "component of Ω or γ, compared with the reference; of many starts the root mean square. A bar is the "
-            "interval in which rounding noise alone moves it; dashed: all digits of the format. × is a run that "
-            "failed, or whose error is not available; the line from a dot leads to its label alone.",
+            "Digits right up to a time: −log10 of the largest |error|/max(1, |true value|) over the samples and the "
+            "components of Ω and γ, compared with the reference; for many starts, of the root mean square. A bar is "
+            "the range over which rounding noise alone moves the value; the dashed line marks all digits of the "
+            "format. × marks a run that failed or whose error is not available. Thin lines only connect dots with "
+            "labels.",
         ],
         columns=["case", "format", "T", "samples", "digits right", "of digits", "± digits"],
         across=2,

@@ -126,7 +126,7 @@ class ClaimEvaluation(Kind):
         if sentences:
             yield Headline(f"In {next(iter(forms.values()))[0].precision} {sentences}.")
         yield Cells(
-            "Formulas in floating point: as printed, and in the stable form, each against itself exactly evaluated",
+            "Formulas in floating point, printed and stable form, each compared with its exact evaluation",
             ["case", "format", "form", "Ω error", "θ error", "ψ error", "ψ NaN/inf from |t|", "Ω NaN/inf from |t|"],
             both((row, _cells(row)) for row in rows),
             [f"Errors are the {largest_over(rows)}."],

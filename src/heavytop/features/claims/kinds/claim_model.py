@@ -100,16 +100,16 @@ def claim_error(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         "claim-error",
         "Error of the claim",
         [
-            "Three errors that are easily taken for one another. Model: the formulas, exactly evaluated, against the "
-            "true motion of the heavy top from the same data. Evaluation: the formulas in floating point against the "
-            "same formulas exactly evaluated. Integration: an integrator on the motion that the formulas do solve, "
-            "against that motion.",
+            "Three errors that are easily confused. Model: the formulas, evaluated exactly, compared with the true "
+            "motion of the heavy top from the same data. Evaluation: the formulas in floating point, compared with "
+            "their exact evaluation. Integration: an integrator on the motion that the formulas do solve, compared "
+            "with that motion.",
             "The model’s error of the attitude is the angle between the two attitudes: both motions start at the pole "
-            "γ = e3, where φ and ψ are undefined and their differences say nothing. Beside it the error of the formula "
-            "for ψ, which turns the attitude by as much.",
-            "Crosses along the top mark times at which floating point gives NaN or an infinity. Errors below 1e-26 are "
-            "not drawn, where Ω itself decays, nor is one of exactly 0. Of each case the motion forward in time is "
-            "drawn; backward is in the rows.",
+            "γ = e3, where φ and ψ are undefined and their differences mean nothing. Next to it is the error of the "
+            "formula for ψ, which rotates the attitude by the same angle.",
+            "Crosses along the top mark times at which floating point gives NaN or an infinity. Errors below 1e-26, "
+            "where Ω itself has decayed, and errors of exactly 0 are not drawn. Only motions forward in time are "
+            "drawn; the rows have those backward in time too.",
         ],
         columns=["case", "error", "quantity", "|t| = 1", "largest drawn", "not finite from |t|"],
         across=2,
@@ -281,7 +281,7 @@ class ClaimModel(Kind):
             ["case", "branch", *heads, "Ω off 1 % of α at |t|"],
             both((row, _cells(row, times)) for row in rows),
             [
-                "ΔΩ, Δγ: largest component of claim minus truth, exactly evaluated: no rounding is in these numbers.",
+                "ΔΩ, Δγ: largest component of claim minus truth, evaluated exactly, without rounding errors.",
                 "Off 1 %: the first |t| at which |ΔΩ| is 1 % of α = Ω3(0) I3/I1, proven by bisection.",
                 BRANCHES,
             ],
