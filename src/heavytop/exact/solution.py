@@ -36,6 +36,8 @@ class ExactSolution(Protocol):
     @property
     def start(self) -> State: ...
 
+    def __hash__(self) -> int: ...
+
     def state(self, time: Fraction, bits: int) -> list[arb]:
         """Six balls (Ω1, Ω2, Ω3, γ1, γ2, γ3) at ``time``.
 

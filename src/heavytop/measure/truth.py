@@ -23,12 +23,12 @@ from heavytop.exact.cases.gyrostat import Gyrostat
 from heavytop.exact.catalogue import matches, state_and_attitude
 from heavytop.exact.closed_form import starting_at
 from heavytop.exact.enclosure.run import Validated
-from heavytop.exact.flint.balls import ball, midpoint, radius, radius_text, whole_evaluation, working_precision
+from heavytop.exact.flint.balls import midpoint, radius, radius_text, whole_evaluation, working_precision
 from heavytop.exact.solution import ExactSolution
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.certify import EXACTLY, Certificate, certify, enclosure_of
-from heavytop.measure.scalar import GUARD_BITS
-from heavytop.precision import Precision, Vector, decimal_text, exact, number, real, shown, time_text
+from heavytop.measure.scalar import GUARD_BITS, largest, to_balls
+from heavytop.precision import Precision, Vector, decimal_text, number, real, shown, time_text
 from heavytop.records import Against, Certified
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import check_times
@@ -270,13 +270,13 @@ def _around(coarse: Sequence[Any], fine: Sequence[Any], bits: int) -> list[list[
 
 
 def _group_balls(coarse: Sequence[Any], fine: Sequence[Any], bits: int) -> list[arb]:
-    one, two = ([exact(value) for value in state] for state in (coarse, fine))
+    one, two = to_balls(coarse), to_balls(fine)
     balls: list[arb] = []
     for k in range(0, len(one), 3):
         group = two[k : k + 3]
-        apart = max(abs(b - a) for a, b in zip(one[k : k + 3], group, strict=True))
-        apart += max(map(abs, group)) * Fraction(2) ** -bits
-        balls += [ball(value) + arb(0, ball(apart).abs_upper()) for value in group]
+        apart = largest([b - a for a, b in zip(one[k : k + 3], group, strict=True)])
+        apart += largest(group) * arb(2) ** -bits
+        balls += [value + arb(0, apart.abs_upper()) for value in group]
     return balls
 
 
@@ -287,7 +287,7 @@ _DIGITS_A_BIT = Fraction(30103, 100000)
 _SPARE_DIGITS = 3
 _EFFORT = 1.0
 """Seconds that a second source at the horizon itself may cost; beyond, it is compared near 0 and near the horizon."""
-_SHARED_STATES = 1024
+_SHARED_STATES, _SHARED_BITS = 1024, 64
 
 Evaluate = Callable[[Fraction, int], Sequence[arb]]
 
@@ -340,7 +340,8 @@ class Known:
     @property
     def truth(self) -> Truth:
         """For a scorer."""
-        return Truth(self.against, self.solution.state)
+        enclosed = isinstance(self.solution, Validated)  # more bits than asked for are another run
+        return Truth(self.against, self.solution.state if enclosed else states_of(self.solution))
 
 
 def truth(problem: Problem, times: Sequence[Fraction], effort: float | None = None) -> Truth | str:
@@ -355,7 +356,7 @@ def truth(problem: Problem, times: Sequence[Fraction], effort: float | None = No
     known = known_motion(replace(problem, xi=None), horizon)
     if isinstance(known, Known):
         if problem.xi is None:
-            return replace(known.truth, state=_states_of(problem) or known.solution.state)
+            return known.truth
         if (nine := _nine(known.solution, problem, horizon)) is not None:
             return Truth(known.against, nine)
     computed = _computed(problem, times, effort)
@@ -368,10 +369,8 @@ def truth(problem: Problem, times: Sequence[Fraction], effort: float | None = No
 
 def uncertified(problem: Problem, times: Sequence[Fraction]) -> Truth | str:
     """A truth for the scatter of runs that differ in their roundings alone: no second source is asked."""
-    form, state = closed_form(problem), _states_of(problem)
-    if form is not None and state is not None:
-        return Truth(Against("proven", form.method), state)
-    return _computed(problem, times)
+    form = closed_form(problem)
+    return _computed(problem, times) if form is None else Truth(Against("proven", form.method), states_of(form))
 
 
 def _computed(problem: Problem, times: Sequence[Fraction], effort: float | None = None) -> Truth | str:
@@ -396,9 +395,15 @@ def certified(solution: ExactSolution, time: Fraction, bits: int) -> Known | Non
     excludes it.
     """
     digits = int(bits * _DIGITS_A_BIT)
-    certificate = certify(solution, time, digits, enclosure=enclosure_of(solution, effort=_EFFORT))
+    certificate = certify(solution, time, digits, enclosure=_enclosure(solution))
     needed = int((bits - GUARD_BITS) * _DIGITS_A_BIT) + _SPARE_DIGITS
     return Known(solution, certificate, time, bits) if certificate.agreed_digits >= needed else None
+
+
+@lru_cache(maxsize=8)
+def _enclosure(solution: ExactSolution) -> Validated:
+    """The second source of a motion, whose pilots rows of several formats share."""
+    return enclosure_of(solution, effort=_EFFORT)
 
 
 @lru_cache(maxsize=8)
@@ -410,11 +415,11 @@ def closed_form(problem: Problem) -> ExactSolution | None:
     return next(matches(problem.top, problem.start, problem.system), None)
 
 
-@lru_cache(maxsize=8)
-def _states_of(problem: Problem) -> Evaluate | None:
-    """The states of the closed form, which rows and reruns of one problem share; None without a form."""
-    form = closed_form(problem)
-    return None if form is None else lru_cache(maxsize=_SHARED_STATES)(form.state)
+@lru_cache(maxsize=16)
+def states_of(solution: ExactSolution) -> Evaluate:
+    """The states of a motion, which rows and reruns share, also of formats between the same multiples of 64 bits."""
+    states = lru_cache(maxsize=_SHARED_STATES)(solution.state)
+    return lambda time, bits: states(time, -(-bits // _SHARED_BITS) * _SHARED_BITS)
 
 
 @lru_cache(maxsize=32)

@@ -379,7 +379,7 @@ _PILOT_BITS = 128
 _PILOT_ROOM = 72
 """Bits that the generic top of the tests loses to t = 100: up to there the pilot is the enclosure."""
 _MOST_PILOT_BITS = 352
-_HOPELESS, _SURELY = 8, 1.25
+_HOPELESS, _SURELY = 8, 1.2
 """Factors of the effort, and of the largest cost, beyond which a pilot is abandoned after a hundred steps; after 25
 steps they are four times as large."""
 _LARGEST_RATE = 2**100
@@ -458,7 +458,7 @@ class Validated:
     def cost(self, time: Fraction, bits: int, most: float | None = None) -> float:
         """Seconds of the model of the cost that the state at ``time`` takes: steps times bits, by no clock.
 
-        most: a pilot ends early where the cost exceeds this by a quarter; None for eight times the effort.
+        most: a pilot ends early where the cost exceeds this by a fifth; None for eight times the effort.
         """
         return 0.0 if time == 0 else self._cost(time, bits, self.start.flat, most=most)
 

@@ -21,7 +21,7 @@ from heavytop.kind import Kind
 from heavytop.measure.rounding_noise import Reruns, banded, escape_band
 from heavytop.measure.scalar import GUARD_BITS
 from heavytop.measure.scorer import DRIFT, INTEGRATION_ERROR, SOLUTION_ERROR, Scorer
-from heavytop.measure.truth import Truth, certified
+from heavytop.measure.truth import Truth, certified, states_of
 from heavytop.precision import DOUBLE, exact, parse, time_text
 from heavytop.records import HEYOKA, Against, Beside, Direction, Metric, Quantity, Row, RowKey, by_name
 from heavytop.report.compare.verdicts import size
@@ -115,7 +115,7 @@ class Homoclinic(Kind):
         known = certified(closed, early, precision.bits + GUARD_BITS)
         if known is None:
             raise OutOfReach(f"{closed.method} is not certified for {precision.name}.", "Use a format with fewer bits.")
-        truth = known.truth.remembered()
+        truth = known.truth
         scorer = _scorer(case, problem, truth, task.keep)
         run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer)
         error = scorer.error
@@ -267,7 +267,7 @@ def _reruns(
 ) -> tuple[list[dict[str, Metric]], list[Fraction | None]]:
     """Metrics and escape times of the reruns, shared by all formats that the case is measured in."""
     assert case.homoclinic is not None
-    truth = Truth(Against("proven", case.homoclinic.method), case.homoclinic.state).remembered()
+    truth = Truth(Against("proven", case.homoclinic.method), states_of(case.homoclinic))
     scorers = reruns.of(times, lambda problem: _scorer(case, problem, truth))
     return [scorer.metrics() for scorer in scorers], [
         scorer.error.escape for scorer in scorers if scorer.error is not None

@@ -252,20 +252,19 @@ class Signs:
 
     def _by_terms(self, p: fmpq_mpoly) -> Sign:
         """By terms of one sign; their coefficients may be numbers that are no fractions."""
+        if not self.numbers.keys() & used(p):
+            signs = (self._of_term(monomial, Sign(1 if c > 0 else -1, True)) for monomial, c in p.to_dict().items())
+            return next(signs) if len(p) == 1 else sum_of(signs)
         groups: dict[Any, dict[Any, Any]] = {}
         for monomial, coefficient in p.to_dict().items():
             number = tuple(power if index in self.numbers else 0 for index, power in enumerate(monomial))
             rest = tuple(0 if index in self.numbers else power for index, power in enumerate(monomial))
             groups.setdefault(rest, {})[number] = coefficient
-        signs = [self._of_term(rest, numbers) for rest, numbers in groups.items()]
-        return signs[0] if len(signs) == 1 else sum_of(signs)
+        signs = (self._of_term(rest, self._by_number(self._ring.context.from_dict(c))) for rest, c in groups.items())
+        return next(signs) if len(groups) == 1 else sum_of(signs)
 
-    def _of_term(self, monomial: Any, numbers: dict[Any, Any]) -> Sign:
-        coefficient = self._ring.context.from_dict(numbers)
-        if coefficient.is_constant():
-            sign = Sign(1 if coefficient.leading_coefficient() > 0 else -1, True)
-        else:
-            sign = self._by_number(coefficient)
+    def _of_term(self, monomial: Any, sign: Sign) -> Sign:
+        """The sign of a monomial times a coefficient of that sign."""
         for index, power in enumerate(monomial):
             if power:
                 g = self._ring.generators[index]
@@ -459,9 +458,9 @@ class Signs:
         """With a generator g ≥ 0 written as R², where there is a root R of g."""
         for root, square in list(self._ring.squares.items()):
             (index, *others) = used(square) or {-1}
+            alone = not others and index in used(p) and square == self._ring.gens[index]
             # that there is a root does not make it real
-            is_real = self._at_once(square).value > 0
-            if is_real and not others and index in used(p) and square == self._ring.gens[index]:
+            if alone and self._at_once(square).value > 0:
                 return self.of(self.substituted(p, index, self._ring.gens[root] ** 2))
         return UNKNOWN
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from itertools import combinations_with_replacement
 from typing import Any, ClassVar
 
@@ -289,7 +290,7 @@ class GeneralClaim(_PaperClaim):
         omega = (first, _W, third)
 
         def rate(value: sympy.Expr) -> sympy.Expr:
-            return sympy.diff(value, _W) * speed
+            return _derivative(value, _W) * speed
 
         gamma = self.gamma(c, omega)
         # (3.3) prints arctan, right for Ω2 > 0; the smooth branch keeps the quadrant
@@ -337,7 +338,11 @@ class GeneralClaim(_PaperClaim):
 
 
 def _rate(value: sympy.Expr) -> sympy.Expr:
-    return sympy.diff(value, _T)
+    return _derivative(value, _T)
+
+
+_derivative = lru_cache(maxsize=256)(sympy.diff)
+"""Branches, steps and both systems have theirs in common."""
 
 
 def _turned_formulas(gamma: tuple[sympy.Expr, ...], angles: tuple[sympy.Expr, ...]) -> Formulas:
