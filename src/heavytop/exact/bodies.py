@@ -93,19 +93,15 @@ class BodyMotion:
         """
         known = self._known(_DATA_BITS)
         if known[0].uncertainty is not None:
-            return self.method, self._enclosed
+            return self.method, lambda time, bits: self._evaluated(
+                time, bits, lambda motion, working: cast(Validated, motion[1]).with_attitude(time, working)
+            )
         method, inner = state_and_attitude(known[1], latest, bits, self.effort)
         if known[0].xi is not None:
             inner = starting_at(known[0].xi, known[1].start.gamma, inner)
         if not known[0].is_rotated:
             return method, inner
         return method, lambda time, bits: _turned(known, bits, lambda _known, working: inner(time, working))
-
-    def _enclosed(self, time: Fraction, bits: int) -> list[arb]:
-        def evaluate(known: tuple[Resolved, ExactSolution], working: int) -> Sequence[arb]:
-            return cast(Validated, known[1]).with_attitude(time, working)
-
-        return self._evaluated(time, bits, evaluate)
 
     def _evaluated(self, time: Fraction, bits: int, evaluate: Evaluate) -> list[arb]:
         """The vectors of ``evaluate`` in the input axes, to ``bits`` bits."""

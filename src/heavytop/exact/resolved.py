@@ -21,7 +21,7 @@ from fractions import Fraction
 from math import isqrt
 from typing import Any
 
-from heavytop.exact.flint.balls import FUNCTIONS, BallLike, ball, midpoint, radius, whole_evaluation, working_precision
+from heavytop.exact.flint.balls import FUNCTIONS, ball, midpoint, radius, whole_evaluation, working_precision
 from heavytop.precision import Vector, dot, round_to
 from heavytop.top.attitude import Attitude, Rows, perpendicular, rotated, transposed
 from heavytop.top.bodies import IDENTITY, Body, PrincipalAxes
@@ -62,10 +62,6 @@ class Resolved:
     def is_rotated(self) -> bool:
         """Whether the input axes are not the principal ones."""
         return self.axes != IDENTITY
-
-    def in_given_axes(self, state: Any) -> list[BallLike]:
-        """A state, (Ω, γ) or (Ω, γ, ξ), in the input axes, over any ring that rationals act on."""
-        return [value for begin in range(0, len(state), 3) for value in rotated(self.axes, state[begin : begin + 3])]
 
 
 def resolve(body: Body | HeavyTop, start: State, bits: int = 256) -> Resolved:

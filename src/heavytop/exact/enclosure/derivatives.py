@@ -49,7 +49,6 @@ from heavytop.exact.enclosure.step import (
     StepSeries,
     Whole,
     falling,
-    horner,
     in_other_bits,
     lacking,
     norm,
@@ -71,7 +70,7 @@ from heavytop.multiword.fixed_point.arithmetic import Grid
 from heavytop.multiword.fixed_point.certified_series import CertifiedSeries, WordSeries
 from heavytop.multiword.fixed_point.first_variation import CertifiedColumns, WordColumns
 from heavytop.multiword.fixed_point.fixed_point_run import excess
-from heavytop.multiword.integers.integer_series import QuadraticComponent, coefficients
+from heavytop.multiword.integers.integer_series import QuadraticComponent, coefficients, horner
 from heavytop.precision import decimal_text
 from heavytop.top.equations import Parameters, System
 

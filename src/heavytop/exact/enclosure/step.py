@@ -50,7 +50,7 @@ from gmpy2 import mpq, mpz
 from numpy.typing import NDArray
 
 from heavytop.multiword.fixed_point.certified_series import CertifiedSeries, WordSeries
-from heavytop.multiword.integers.integer_series import QuadraticComponent, QuadraticField, coefficients
+from heavytop.multiword.integers.integer_series import QuadraticComponent, QuadraticField, coefficients, horner
 from heavytop.multiword.problem import variation as variation_of
 
 # The exact coefficients of a vector field of degree two.
@@ -360,17 +360,6 @@ def rounded_off(centre: Sequence[int], dropped: int) -> tuple[mpz, ...]:
     """Each number over 2^dropped, rounded to nearest."""
     half = mpz(1) << (dropped - 1)
     return tuple((value + half) >> dropped for value in centre)
-
-
-def horner(coefficients: list[int], tau: Fraction) -> mpz:
-    """The polynomial at 0 ≤ τ ≤ 1, within half a unit an order; exactly at 1."""
-    if tau == 1:
-        return mpz(sum(coefficients))
-    total = mpz(0)
-    numerator, denominator = mpz(tau.numerator), mpz(tau.denominator)
-    for value in reversed(coefficients):
-        total = value + (2 * total * numerator + denominator) // (2 * denominator)
-    return total
 
 
 def _new_frame(variation: Matrix, variation_error: float, errors: Errors) -> tuple[Matrix, Matrix, float]:

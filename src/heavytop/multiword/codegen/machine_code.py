@@ -504,9 +504,14 @@ class Code:
         return chosen
 
 
-def function(module: ir.Module, name: str, result: ir.Type, arguments: Sequence[ir.Type]) -> tuple[ir.Function, Code]:
-    """A new function of ``module`` whose pointers do not alias, and the writer of its body."""
+def function(
+    module: ir.Module, name: str, result: ir.Type, arguments: Sequence[ir.Type], internal: bool = False
+) -> tuple[ir.Function, Code]:
+    """A new function of ``module`` whose pointers do not alias, and the writer of its body; internal: not exported."""
     made = ir.Function(module, ir.FunctionType(result, list(arguments)), name)
+    if internal:
+        made.linkage = "internal"
+        made.attributes.add("noinline")
     for argument in made.args:
         if isinstance(argument.type, ir.PointerType):
             argument.add_attribute("noalias")

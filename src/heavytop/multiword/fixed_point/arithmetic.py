@@ -188,9 +188,7 @@ def write_kernels(module: ir.Module, grid: Grid, row: int) -> list[ir.Function]:
 
 def _write_kernel(module: ir.Module, grid: Grid, count: int, row: int) -> ir.Function:
     arguments = [POINTER, POINTER, INT, POINTER, POINTER]
-    made, code = function(module, f"products_{count}", ir.VoidType(), arguments)
-    made.linkage = "internal"
-    made.attributes.add("noinline")
+    made, code = function(module, f"products_{count}", ir.VoidType(), arguments, internal=True)
     left, right, terms, sums, seen = code.arguments
     base = grid.words - count
 
@@ -223,9 +221,7 @@ def write_long_kernel(module: ir.Module, grid: Grid, row: int) -> ir.Function:
     not depend on each other: the low parts of a level are added after the products of the next, between two checks.
     """
     arguments = [POINTER, POINTER, INT, POINTER, POINTER, INT]
-    made, code = function(module, "long_products", ir.VoidType(), arguments)
-    made.linkage = "internal"
-    made.attributes.add("noinline")
+    made, code = function(module, "long_products", ir.VoidType(), arguments, internal=True)
     left, right, terms, sums, seen, levels = code.arguments
     last, centre = levels - 1, _bits(grid.coarse(0))
 

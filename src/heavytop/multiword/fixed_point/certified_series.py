@@ -194,10 +194,8 @@ class CertifiedSeries:
             .rows[: size_of(grid, self.vectors).row * length]
             .reshape(length, 1 + self.vectors, grid.words, 8)
         )
-        parts = components(table[:, 1])
-        if self.vectors == 2:
-            parts += components(table[:, 2])[3:]
-        return [in_ulps(component, grid).tolist() for component in parts]
+        lanes = [*numpy.moveaxis(table[:, 1:], (1, 3), (0, 1))]
+        return [in_ulps(component, grid).tolist() for component in fixed_point_run.state_of_left(lanes)]
 
     def computed(self, centre: Sequence[int], halvings: int) -> int:
         """N, with the coefficients in the rows of this thread's scratch; negative where the series does not exist."""
@@ -314,12 +312,6 @@ def _error(grid: Grid, products: Doubles, terms: int) -> tuple[float, float]:
     dropped = float(products[words:] @ _ulps(grid)) * _UP
     rounding = 2.0**-53 * largest * _UP
     return (words + 1) * rounding + dropped, rounding
-
-
-def components(left: Doubles) -> list[Doubles]:
-    """The exact words of y from those of L = (Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2, …) along the last axis."""
-    middle = left[..., 5] / 2
-    return [*(left[..., lane] for lane in (2, 0, 1)), left[..., 4] - middle, middle, left[..., 3] - middle]
 
 
 def in_ulps(words: Doubles, grid: Grid) -> Any:

@@ -51,8 +51,8 @@ from heavytop.multiword.codegen.machine_code import (
 )
 from heavytop.multiword.codegen.recurrence import Coefficients, permutations
 from heavytop.multiword.fixed_point.arithmetic import EXPONENT_BITS, Grid, carried, component
-from heavytop.multiword.fixed_point.certified_series import CertifiedSeries, components, in_ulps
-from heavytop.multiword.fixed_point.fixed_point_run import words_of_rows
+from heavytop.multiword.fixed_point.certified_series import CertifiedSeries, in_ulps
+from heavytop.multiword.fixed_point.fixed_point_run import state_of_left, words_of_rows
 from heavytop.multiword.fixed_point.products import WordRows
 from heavytop.multiword.fixed_point.steps import FIRED, SeriesCode, most_orders, raises_of
 from heavytop.top.equations import System
@@ -322,4 +322,4 @@ class _Scratch:
         """Every v_n of each component."""
         grid = certified.grid
         left = self.rows[: 16 * grid.words * (order + 1)].reshape(order + 1, 2, grid.words, 8)[:, 1]
-        return [in_ulps(part, grid).tolist() for part in components(left)]
+        return [in_ulps(part, grid).tolist() for part in state_of_left([numpy.moveaxis(left, -1, 0)])]

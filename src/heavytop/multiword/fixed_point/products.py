@@ -166,9 +166,8 @@ def _write_tile(module: ir.Module, levels: int, side: int, most_sums: int) -> ir
 
     Split at 2^24: multiples of that are added to the level before.
     """
-    made, code = function(module, f"tile_{levels}_{side}", ir.VoidType(), [POINTER, POINTER, INT_POINTER, INT, POINTER])
-    made.linkage = "internal"
-    made.attributes.add("noinline")
+    arguments = [POINTER, POINTER, INT_POINTER, INT, POINTER]
+    made, code = function(module, f"tile_{levels}_{side}", ir.VoidType(), arguments, internal=True)
     left, right, where, orders, sums = code.arguments
     pairs = [
         [(i, level - i) for i in range(side) if 0 <= level - i < side] for level in range(min(levels, 2 * side - 1))
@@ -229,9 +228,7 @@ def write_sums(module: ir.Module, wide: bool) -> ir.Function:
     triangles = [_write_tile(module, d, d, sizes.sums) for d in range(1, sizes.triangle + 1)]
     tiles = triangles[:side] + [_write_tile(module, d, side, sizes.sums) for d in range(side + 1, 2 * side)]
     arguments = [POINTER, POINTER, INT_POINTER, INT, INT, POINTER]
-    made, code = function(module, "sum_products", ir.VoidType(), arguments)
-    made.linkage = "internal"
-    made.attributes.add("noinline")
+    made, code = function(module, "sum_products", ir.VoidType(), arguments, internal=True)
     left, right, where, orders, levels, sums = code.arguments
     b, tile, group = code.builder, code.integer(LANES * side), code.integer(_PRODUCTS // side)
     with b.if_then(~(levels > len(triangles))):

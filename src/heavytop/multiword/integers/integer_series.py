@@ -256,7 +256,7 @@ class IntegerMotion(ResumableRun):
 
     def sample(self, time: Fraction) -> tuple[Fraction, ...]:
         behind = (time - self._began) * Fraction(2) ** self._taken
-        return self._exact([_value(component, behind) for component in self._series])
+        return self._exact([horner(component, behind) for component in self._series])
 
     def coefficients(self, n: int) -> tuple[Fraction, ...]:
         return self._exact([component[n] for component in self._series])
@@ -272,9 +272,11 @@ class IntegerMotion(ResumableRun):
         self.steps = steps
 
 
-def _value(coefficients: list[mpz], at: Fraction) -> mpz:
-    """Σ c_n atⁿ for 0 ≤ at ≤ 1, rounded to nearest in every step."""
-    total, numerator, denominator = mpz(0), mpz(at.numerator), mpz(at.denominator)
+def horner(coefficients: list[mpz], x: Fraction) -> mpz:
+    """Σ c_n xⁿ for 0 ≤ x ≤ 1, with each step of Horner's scheme rounded to nearest; exact at 1."""
+    if x == 1:
+        return sum(coefficients, mpz(0))
+    total, numerator, denominator = mpz(0), mpz(x.numerator), mpz(x.denominator)
     for value in reversed(coefficients):
         total = value + (2 * total * numerator + denominator) // (2 * denominator)
     return total
