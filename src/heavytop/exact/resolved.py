@@ -70,12 +70,28 @@ def resolve(body: Body | HeavyTop, start: State, bits: int = 256) -> Resolved:
     bits: of the rounding of irrational data: of a tensor relative to its smallest moment, of others to the largest of
     their kind.
     """
-    spin, rows, errors = _start(start, bits)
-    up = rows[2] if rows is not None else start.gamma
+    omega, rows, start_errors = _start(start, bits)
     if isinstance(body, HeavyTop):
-        return _resolved(body, IDENTITY, None, (spin, up, rows), errors, bits)
-    principal = body.principal(bits)
-    return _resolved(body.top_in(principal), principal.axes, (body, principal), (spin, up, rows), errors, bits)
+        top, axes, exact = body, IDENTITY, True
+    else:
+        principal = body.principal(bits)
+        top, axes, exact = body.top_in(principal), principal.axes, principal.exact
+    back, up = transposed(axes), rows[2] if rows is not None else start.gamma
+    vector = rows[0] if rows is not None else perpendicular(up) if dot(up, up) == 1 else None
+    xi = None if vector is None else rotated(back, vector)
+    if exact and not any(start_errors):
+        return Resolved(top, State(rotated(back, omega), rotated(back, up)), xi, axes, None)
+    # inexact data are shortened
+    rounding, rate = Fraction(1, 2**bits), Fraction(0)
+    short_omega, change = _shortened(rotated(back, omega), bits)
+    if not exact:
+        assert isinstance(body, Body)
+        top, lacks = _rounded_top(top, bits)
+        fastest = _root(dot(omega, omega)) + 2 * (start_errors[0] + change)
+        rate = _field_error(body, principal, lacks, fastest)
+    # a vector rotated by A changes by at most √3 times the largest of its components
+    errors = (*[2 * start_errors[0] + change] * 3, *[2 * start_errors[1] + rounding] * 6)
+    return Resolved(top, State(short_omega, rotated(back, up)), xi, axes, Uncertainty(errors, rate))
 
 
 def _start(start: State, bits: int) -> tuple[Vector, tuple[Vector, Vector, Vector] | None, tuple[Fraction, Fraction]]:
@@ -110,36 +126,6 @@ def _distance(attitude: Attitude, near: Rows[Fraction], bits: int) -> Fraction:
         return max(abs(midpoint(gap)) + radius(gap) for gap in gaps)
 
 
-def _resolved(
-    top: HeavyTop,
-    axes: tuple[Vector, Vector, Vector],
-    body_and_axes: tuple[Body, PrincipalAxes] | None,
-    start: tuple[Vector, Vector, Any],
-    start_errors: tuple[Fraction, Fraction],
-    bits: int,
-) -> Resolved:
-    spin, up, rows = start
-    back = transposed(axes)
-    unit = dot(up, up) == 1
-    xi = rows[0] if rows is not None else perpendicular(up) if unit else None
-    exact = body_and_axes is None or body_and_axes[1].exact
-    if exact and not any(start_errors):
-        state = State(rotated(back, spin), rotated(back, up))
-        return Resolved(top, state, None if xi is None else rotated(back, xi), axes, None)
-    # inexact data are shortened
-    rounding = Fraction(1, 2**bits)
-    omega, speed = _shortened(rotated(back, spin), bits)
-    rounded, lacks = (top, None) if exact else _rounded_top(top, bits)
-    rate = Fraction(0)
-    if body_and_axes is not None and not exact:
-        fastest = _root(dot(spin, spin)) + 2 * (start_errors[0] + speed)
-        rate = _field_error(body_and_axes, rounded, lacks, fastest)
-    # a vector turned by A moves by at most √3 times the largest of its components
-    errors = (*[2 * start_errors[0] + speed] * 3, *[2 * start_errors[1] + rounding] * 6)
-    state = State(omega, rotated(back, up))
-    return Resolved(rounded, state, None if xi is None else rotated(back, xi), axes, Uncertainty(errors, rate))
-
-
 def _shortened(values: Vector, bits: int) -> tuple[Vector, Fraction]:
     """The vector rounded to ``bits`` bits, and the largest change of a component."""
     first, second, third = (round_to(value, bits) for value in values)
@@ -158,17 +144,12 @@ def _rounded_top(top: HeavyTop, bits: int) -> tuple[HeavyTop, tuple[Vector, Vect
     return short, (missing[0], missing[1])  # type: ignore[return-value]
 
 
-def _field_error(
-    body_and_axes: tuple[Body, PrincipalAxes], top: HeavyTop, lacks: tuple[Vector, Vector] | None, start_speed: Fraction
-) -> Fraction:
+def _field_error(body: Body, principal: PrincipalAxes, lacks: tuple[Vector, Vector], start_speed: Fraction) -> Fraction:
     """A bound of every component of δ in the head of this file.  Norms are Frobenius' and Euclid's, rounded up."""
-    body, principal = body_and_axes
     beyond = _root(sum(value * value for row in principal.left for value in row))
     tensor = _root(sum(value * value for row in body.tensor for value in row))
-    zero = (Fraction(0), Fraction(0), Fraction(0))
-    rotor = body.rotor or zero
-    pull, whirl = _root(dot(body.moment, body.moment)), _root(dot(rotor, rotor))
-    pull_error, whirl_error = (_root(dot(vector, vector)) for vector in lacks or (zero, zero))
+    vectors = body.moment, body.rotor or (Fraction(0),) * 3, *lacks
+    pull, whirl, pull_error, whirl_error = (_root(dot(vector, vector)) for vector in vectors)
     # |D⁻¹| and |X| as norms of matrices; |γ| is 1 within _MARGIN
     smallest = min(principal.moments) - beyond
     inverse = 1 / smallest

@@ -102,19 +102,17 @@ class Lagrange(ClosedForm):
         return [*prepared.composed(real(w), imag(w), prepared.spin), *prepared.composed(real(g), imag(g), height)]
 
     @property
-    def constants(self) -> tuple[Fraction, Fraction, Fraction, Fraction, Fraction]:
-        """(ν, a·M, C0, E, s²)."""
+    def constants(self) -> tuple[Fraction, ...]:
+        """(I1, A², ν, a·M, C0, E, s²)."""
         omega, gamma, moment, axis = self.start.omega, self.start.gamma, self.top.moment, self.frame[1]
-        square = dot(axis, axis)
-        momentum = self.top.angular_momentum(omega)
-        energy = self.top.inertia[0] * (dot(omega, omega) - dot(omega, axis) ** 2 / square) / 2 + dot(moment, gamma)
-        return dot(moment, axis) / square, dot(axis, momentum), dot(momentum, gamma), energy, dot(gamma, gamma)
+        i1, length, momentum = self.top.inertia[0], dot(axis, axis), self.top.angular_momentum(omega)
+        energy = i1 * (dot(omega, omega) - dot(omega, axis) ** 2 / length) / 2 + dot(moment, gamma)
+        spin, area, square = dot(axis, momentum), dot(momentum, gamma), dot(gamma, gamma)
+        return i1, length, dot(moment, axis) / length, spin, area, energy, square
 
     def quartic(self) -> QuarticMotion:
         """x = a·γ on its cubic."""
-        n, spin, area, energy, square = self.constants
-        i1, axis = self.top.inertia[0], self.frame[1]
-        length = dot(axis, axis)
+        (i1, length, n, spin, area, energy, square), axis = self.constants, self.frame[1]
         cubic = (
             length * (2 * energy * square / i1 - area**2 / i1**2),
             2 * area * spin / i1**2 - 2 * n * length * square / i1,
@@ -126,18 +124,15 @@ class Lagrange(ClosedForm):
 
     def winding(self) -> Winding:
         """V and κ of g and w."""
-        n, spin, area, energy, _ = self.constants
-        i1, axis = self.top.inertia[0], self.frame[1]
-        length = dot(axis, axis)
+        i1, length, n, spin, area, energy, _ = self.constants
         slope = (area * n - energy * spin / length) / (2 * i1**2)
-        rate = (spin / (2 * i1) - dot(axis, self.start.omega)) / length
+        rate = (spin / (2 * i1) - dot(self.frame[1], self.start.omega)) / length
         return Winding((4 * i1 * energy - spin**2 / length) / (12 * i1**2), slope, rate, length)
 
     def axis_winding(self) -> Winding:
         """V and κ of the axis of symmetry in space; needs γ != 0."""
-        n, spin, area, energy, square = self.constants
-        i1, axis = self.top.inertia[0], self.frame[1]
-        spin_square = spin**2 / dot(axis, axis)
+        i1, length, n, spin, area, energy, square = self.constants
+        spin_square = spin**2 / length
         value = (4 * i1 * energy * square + 2 * spin_square * square - 3 * area**2) / (12 * i1**2 * square)
         cubic = area**3 - 2 * area * energy * i1 * square - area * spin_square * square + 2 * i1 * spin * n * square**2
         return Winding(value, -cubic / (4 * i1**3 * square**2), area / (2 * i1 * square), square)
@@ -171,7 +166,7 @@ class Lagrange(ClosedForm):
         point = prepared.motion.lattice.point(time, 2)
         inverse = 1 / prepared.motion.denominator(point)
         (h,), (g, w) = (c.at(point, inverse) for c in (_axis(self), prepared.horizontal))
-        x, size = prepared.motion.position(point, inverse)[0], ball(self.constants[4]).sqrt()
+        x, size = prepared.motion.position(point, inverse)[0], ball(self.constants[6]).sqrt()
         length, across = prepared.axis, prepared.across
         plus, minus = _sides(h[0] / length, coefficient(h, 1) / length, g[0] / across, w[0] / across, x / length, size)
         vector = ((plus + minus) / 2).real, ((plus - minus) / acb(0, 2)).real
