@@ -29,7 +29,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import factorial
-from typing import Any
+from typing import Any, NamedTuple
 
 from flint import arb, arb_mat, fmpq_mat, fmpq_poly
 
@@ -195,13 +195,11 @@ class _Exact:
     series: tuple[Fraction, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class _Curve:
-    """The curve in balls: D in the first row, D Mi below it; order: of the pole of D at t = 0; body: k and 1/I."""
+class _Curve(NamedTuple):
+    """The curve in balls: D in the first row, D Mi below it; order: of the pole of D at t = 0."""
 
     rows: arb_mat
     order: int
-    body: tuple[tuple[arb, arb], ...]
 
 
 def _basis(g2: Fraction, g3: Fraction) -> list[list[Fraction]]:
@@ -284,8 +282,7 @@ def _curve(case: ZhukovskyVolterra) -> _Curve:
     exact = _exact(case)
     order = _POLE if exact.denominator[4] else _POLE - 1
     rows: Any = [[ball(c) for c in row[:order]] for row in (exact.denominator, *exact.numerators)]
-    body = tuple((ball(k), ball(1 / i)) for k, i in zip(case._rotor, case.top.inertia, strict=True))
-    return _Curve(arb_mat(rows), order, body)
+    return _Curve(arb_mat(rows), order)
 
 
 @cached_per_precision

@@ -168,7 +168,7 @@ class Lattice:
     """A lattice of discriminant other than 0, at one working precision.
 
     roots: the values e of ℘ at z = 1/2, (1 + τ)/2, τ/2.  half_period: ω, the smallest positive real one.  ratio: τ.
-    zero: θ1'(0), θ2(0), θ3(0), θ4(0).  quasi_period: η = ζ(ω).
+    zero: θ1'(0), θ2(0), θ3(0), θ4(0).
     theta: the series for numbers, None where the nome is large (a long real period: beside a double root).
     parts: their polynomials, of T, raised and the last two thetas of :class:`Point`.
     """
@@ -177,7 +177,6 @@ class Lattice:
     half_period: arb
     ratio: acb
     zero: tuple[acb, ...]
-    quasi_period: arb
     theta: Theta | None
     parts: tuple[arb_poly, ...]
 
@@ -383,18 +382,16 @@ def _from_roots(roots: _Roots) -> Lattice:
 
 
 def _with_thetas(roots: tuple[acb, acb, acb], half: arb, ratio: acb) -> Lattice:
-    _, two, three, four = thetas(acb(0), ratio)
-    first, third = (thetas(acb(0), ratio, order)[0] for order in (1, 3))
-    zero, quasi_period = (first, two, three, four), (-third / (12 * half * first)).real
+    zero = thetas(acb(0), ratio, 1)[0], *thetas(acb(0), ratio)[1:]
     nome = (-arb.pi() * ratio.imag).exp()
     if not nome < _LARGE:
-        return Lattice(roots, half, ratio, zero, quasi_period, None, ())
+        return Lattice(roots, half, ratio, zero, None, ())
     square = nome * nome if ratio.real == 0 else -nome * nome
     theta = Theta(square, arb.pi() / (2 * half), False, arb(1))
     one, (odd, even) = arb(1), theta.odd()
     rest = (theta.even(1), theta.even(-1)) if ratio.real == 0 else (theta.both(), arb_poly([1]))
     parts = odd * (1 / (odd(one) * theta.rate)), *(poly * (1 / poly(one)) for poly in (even, *rest))
-    return Lattice(roots, half, ratio, zero, quasi_period, theta, parts)
+    return Lattice(roots, half, ratio, zero, theta, parts)
 
 
 # e^(iκt) Φ(t), Φ(t) = σ(V − t) e^(ζ(V) t)/(σ(V) σ(t)), as balls.

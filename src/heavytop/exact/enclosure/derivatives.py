@@ -461,7 +461,7 @@ def _tangent(
     grid = motion.grid(precision) if in_words else None
     if grid is not None and not grid.relative and len(lanes) == len(data):
         certified = motion.certified(precision)
-        columns = CertifiedColumns(certified, lanes)
+        columns = CertifiedColumns(certified, lanes) if certified else None
     tangent = Tangent(motion.field, precision, together, certified, columns, data_of, places)
     _require_right(tangent, motion)
     return tangent

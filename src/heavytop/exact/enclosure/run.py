@@ -137,7 +137,7 @@ class EnclosureRun:
         precision = self.motion.fewer(taken.precision, taken.node.errors.bits)
         node = taken.end(transfer, taken.precision - precision)
         if precision < taken.precision and (not self.falls or self.falls[-1].time < node.time):
-            self.falls = (*self.falls, Fall(node.time, precision, self.motion.certified_at(precision)))
+            self.falls = (*self.falls, Fall(node.time, precision, self.motion.certified(precision)))
         self.keep(node)
         return node
 
@@ -318,10 +318,6 @@ class ScaledMotion:
         needed = precision - lost + _GUARD
         return precision if needed > precision else min(precision, self.precision(max(needed, _FEWEST), inf)[0])
 
-    def certified_at(self, precision: int) -> CertifiedSeries | None:
-        """The Taylor coefficients in ``precision`` bits; None where they are exact integers."""
-        return None if self.grid(precision) is None else self.certified(precision)
-
     def grid(self, precision: int) -> Grid | None:
         """The grid of ``precision`` bits; None where there is none."""
         return next((grid for grid in _GRIDS if self.in_words and grid.total == precision), None)
@@ -337,15 +333,14 @@ class ScaledMotion:
         """Seconds by the model of the cost, where ``bits`` bits are left."""
         return self.seconds(self.precision(bits + lost, steps), lost, steps)
 
-    def certified(self, precision: int) -> CertifiedSeries:
-        """The Taylor coefficients on the grid of ``precision`` bits."""
-        if precision not in self._certified:
-            grid = self.grid(precision)
-            assert grid is not None
+    def certified(self, precision: int) -> CertifiedSeries | None:
+        """The Taylor coefficients on the grid of ``precision`` bits; None where there is none."""
+        grid = self.grid(precision)
+        if grid is not None and precision not in self._certified:
             certified = CertifiedSeries(self.scaled, grid, self.forwards)
             self._require_right(certified)
             self._certified[precision] = certified
-        return self._certified[precision]
+        return self._certified.get(precision)
 
     def _require_right(self, certified: CertifiedSeries) -> None:
         """Compare the first step of machine code in this process with exact integers."""
