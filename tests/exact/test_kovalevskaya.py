@@ -199,7 +199,7 @@ def test_a_variable_may_rest_at_a_double_root(omega, gamma, resting):
     motion = motion_from((F(1), F(0)), omega, gamma)
     assert_every_digit(motion, F(7, 3), F(-40), F(10**6))
     for form in motion.made.values():
-        assert isinstance(form.variables[resting], Rest)
+        assert isinstance(form.line.variables[resting], Rest)
     pairs = zip(motion.state(F(5), 180), Validated(motion.top, motion.start).state(F(5), 180), strict=True)
     assert all(a.overlaps(b) for a, b in pairs)
 

@@ -56,12 +56,6 @@ class Euler(WithAttitude):
     source = "E. T. Whittaker, Analytical Dynamics, chapter VI"
     body = (NO_TORQUE,)
 
-    @property
-    def steady(self) -> bool:
-        """Whether Ω is constant: Ω × M = 0."""
-        omega = self.start.omega
-        return not any(cross(omega, self.top.angular_momentum(omega)))
-
     def motion(self, time: BallLike) -> tuple[list[Any], Carry]:
         lattice = _lattice(self)
         if lattice is not None:
@@ -117,11 +111,11 @@ class _Lattice:
 
 @cached_per_precision
 def _lattice(case: Euler) -> _Lattice | None:
-    """The constants of the motion; None for a steady rotation."""
-    if case.steady:
-        return None
+    """The constants of the motion; None for a steady rotation, Ω × M = 0."""
     inertia, omega = case.top.inertia, case.start.omega
     momentum = case.top.angular_momentum(omega)
+    if not any(cross(omega, momentum)):
+        return None
     square, energy = dot(momentum, momentum), dot(omega, momentum)
     roots = [(square * i + energy * j * k) / (i * j * k) for i, j, k in (permuted(inertia, axes) for axes in CYCLIC)]
     a, b, c = axes = tuple(sorted(range(3), key=lambda axis: -roots[axis]))

@@ -216,11 +216,6 @@ class AbelMotion:
         """The phases at ``time`` in the first turns, and whole turns, as :meth:`Line.phases`."""
         return self.line.phases(ball(time * self.level.rate))
 
-    @property
-    def variables(self) -> tuple[Variable, ...]:
-        """v1 and v2."""
-        return self.line.variables
-
     def reduced(self, phases: Sequence[arb], turns: Sequence[int], length: int) -> tuple[Any, ...]:
         """The six components there in the turned frame, series in t' of that length or longer."""
         with series_length(length + 1):
@@ -232,7 +227,7 @@ class AbelMotion:
 
         The argument of the logarithm tends to 0; its rate of change is as exact as the phases.
         """
-        for variable, (low, high) in zip(self.variables, self.ends, strict=True):
+        for variable, (low, high) in zip(self.line.variables, self.ends, strict=True):
             if not isinstance(variable, Approach):
                 continue
             number = high if variable.length > 0 else low
@@ -247,7 +242,7 @@ class AbelMotion:
         """θ1'/v2 and −θ2'/v1."""
         first, second = (
             v * 0 if isinstance(g, Rest) else 1 / ((v1 - v2) * g.density(v))
-            for g, v in zip(self.variables, (v1, v2), strict=True)
+            for g, v in zip(self.line.variables, (v1, v2), strict=True)
         )
         return first, second
 
@@ -262,7 +257,7 @@ class AbelMotion:
 
     def halves(self, variable: int, phase: Any, turns: int) -> list[Any]:
         """h_kb at every branch point."""
-        gap, ends = self.variables[variable], self.ends[variable]
+        gap, ends = self.line.variables[variable], self.ends[variable]
         low, high = gap.ends(phase)
         side = -1 if turns % 2 else 1
         v, half_periods = gap.position(phase), []
@@ -294,7 +289,7 @@ class AbelMotion:
 
     def _spin(self, phases: Sequence[Any], first: Sequence[BallLike], second: Sequence[BallLike]) -> BallLike:
         """(N'D − ND')/(h_10 h_20)."""
-        v1, v2 = (g.position(x) for g, x in zip(self.variables, phases, strict=True))
+        v1, v2 = (g.position(x) for g, x in zip(self.line.variables, phases, strict=True))
         speeds = self._speeds(v1, v2)
         # v2/h_20 = s h_20, and what is left of θ1' but for 1/h_10
         rates = (
@@ -306,7 +301,7 @@ class AbelMotion:
             i, j = self.cubic[a], self.cubic[b]
             weight = self.rows[0][a] * self.rows[1][b] - self.rows[0][b] * self.rows[1][a]
             for k, of_variable, of_other in ((0, first, second), (1, second, first)):
-                if not isinstance(self.variables[k], Rest):
+                if not isinstance(self.line.variables[k], Rest):
                     total += rates[k] * self._turn(k, phases[k], of_variable, i, j) * of_other[i] * of_other[j] * weight
         return total
 
@@ -314,7 +309,7 @@ class AbelMotion:
         """(h_i' h_j − h_i h_j')/h_0, by θ: ½ s_i s_j (v_i − v_j) dv/dθ/(h_0 h_i h_j), in which the ends cancel."""
         low, high = self.ends[variable]
         signs = self._side(variable, i) * self._side(variable, j)
-        value = acb_series(self.variables[variable].bend(phase))
+        value = acb_series(self.line.variables[variable].bend(phase))
         below = {0, i, j}
         for number in (low, high):
             if number not in below:
@@ -425,14 +420,14 @@ class KovalevskayaAttitude:
         a variable rests: there v = 0.
         """
         level = motion.level
-        if any(isinstance(variable, Rest) for variable in motion.variables):
+        if any(isinstance(variable, Rest) for variable in motion.line.variables):
             raise OutOfReach("The azimuth of a motion with a variable at rest is not done.", "Ask for the state alone.")
         apart = level.double() ** 2 - level.fourth
         if apart == 0 or level.area == 0:
             return cls(motion, (), 1 if _factor(level, level.turned()) > 0 else -1)
         offset = ball(level.double()) - motion.pole
         weight = ball(apart) * along_gamma(level) / 2
-        return cls(motion, tuple(_integral(variable, offset, weight, most) for variable in motion.variables))
+        return cls(motion, tuple(_integral(variable, offset, weight, most) for variable in motion.line.variables))
 
     def bearing(self, time: Fraction) -> Bearing:
         """v in the top's own axes, and Λ.  Raises Undecided where the working precision does not prove the phases."""
@@ -537,7 +532,7 @@ class Kovalevskaya(WithBearing, ClosedForm):
         def evaluate(working: int) -> list[arb]:
             motion = _motion(self)
             if isinstance(motion, AbelMotion):
-                for k, variable in enumerate(motion.variables):
+                for k, variable in enumerate(motion.line.variables):
                     if isinstance(variable, Approach):  # the mean rate of its X
                         return [abs(motion.line.mean_rates()[k]) * ball(motion.level.rate)]
             raise NotInClass("The motion is not asymptotic.", "Only asymptotic ones have an exponent.")

@@ -73,11 +73,6 @@ class Pendulum(WithAttitude):
         """A vector along the axis of rotation, its largest component ± 1; 0 in equilibrium."""
         return _axis(self.top, self.start)
 
-    @property
-    def steady(self) -> bool:
-        """Whether it is in equilibrium."""
-        return not any(self.axis)
-
     def motion(self, time: BallLike) -> tuple[list[BallLike], Carry]:
         lattice = _lattice(self)
         return ([arb(0)] * 3, list) if lattice is None else lattice.motion(time)
@@ -161,9 +156,9 @@ class _Lattice:
 @cached_per_precision
 def _lattice(case: Pendulum) -> _Lattice | None:
     """The constants of the motion; None in equilibrium."""
-    if case.steady:
-        return None
     n, gamma, axis = case.top.moment, case.start.gamma, case.axis
+    if not any(axis):
+        return None
     length = dot(axis, axis)
     inertia = dot(axis, case.top.angular_momentum(axis)) / length
     rate = dot(case.start.omega, axis)
