@@ -289,7 +289,7 @@ class ClosedForm(WithXi):
     """The motion of ``top`` from ``start``; each case defines ``method``, ``source`` and its conditions.
 
     body, starts: exact conditions on the top and on the start; the constructor raises NotInClass where one fails.
-    made: what :func:`once` and :func:`cached_per_precision` keep.
+    made: the cache of :func:`once` and :func:`cached_per_precision`.
     """
 
     top: HeavyTop

@@ -31,7 +31,7 @@ Doubles = NDArray[numpy.float64]
 _ORDER = 20
 _TOLERANCE = 2.0**-52
 _STEPS = 1000
-"""Beyond so many steps the amplification is extrapolated."""
+"""The number of steps beyond which the amplification is extrapolated."""
 FOLLOWED = 1e14
 """Beyond this loss a motion in double is another one, and the loss is extrapolated."""
 _STEEPER = 100.0

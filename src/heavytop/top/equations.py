@@ -40,7 +40,7 @@ class Parameters(NamedTuple):
 
     @property
     def rotor_rate(self) -> Fraction:
-        """The rate at which the rotor makes exact motions change, in 1/time unit: |λ|, or the largest |k_i| over the
+        """The rate of change by the rotor of an exact motion, in 1/time unit: |λ|, or the largest |k_i| over the
         smallest moment.
         """
         largest = max(map(abs, self.rotors))
@@ -168,7 +168,7 @@ class System:
         return tuple(value for name in self.enters for value in (p.rotors if name == "rotor" else getattr(p, name)))
 
     def taken_in(self, numbers: Sequence[Any]) -> Parameters:
-        """The parameters of these :meth:`entering` numbers; None for what does not enter."""
+        """The parameters from the numbers of :meth:`entering`; None for those that do not enter."""
         parameters: dict[str, Any] = dict.fromkeys(Parameters._fields)
         remaining = list(numbers)
         for name in self.enters:

@@ -288,7 +288,7 @@ class TimeText(str):
         """The text of a time.
 
         Text is unchanged; a float or another number becomes its exact decimal of up to 60 digits, else a fraction.
-         Raises InputError for what is not a number.
+        Raises InputError for what is not a number.
         """
         number = exact(value)
         if isinstance(value, str):

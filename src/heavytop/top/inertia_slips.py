@@ -113,7 +113,7 @@ def six_of_nine(n: Sequence[Fraction]) -> Six:
 
 
 def steiner(mass: Fraction, centre: Vector) -> Tensor:
-    """m (|c|² 1 − c cᵀ), what the tensor about the pivot has more than the one about the centre of mass."""
+    """m (|c|² 1 − c cᵀ), the tensor about the pivot less the one about the centre of mass."""
     square = dot(centre, centre)
     x, y, z = (mass * (square - value * value) for value in centre)
     a, b, c = centre
@@ -170,7 +170,7 @@ def mending(body: MassProperties) -> str:
 
 def realisable(central: Tensor, slack: Fraction = Fraction(0)) -> bool:
     """Whether a body has this tensor about its centre of mass: positive moments, triangle inequality."""
-    # a moment that is 0 within rounding, or below it: all mass lies on a line, or is missing
+    # a moment within rounding of 0 or negative: all mass is on a line, or missing
     floor = max(slack, _SMALL * max(map(abs, six_of(central))))
     return has_second_moments(central, slack) and is_positive(central) and _semidefinite(central, -floor)
 

@@ -1,6 +1,6 @@
 """Whether an equilibrium, a permanent rotation or a regular precession is stable, decided in exact rationals.
 
-Linearised about a steady motion, the field has eigenvalues ±λ beside those, 0, of its conserved quantities: λ² are the
+Linearised about a steady motion, the field has eigenvalues ±λ, and 0 for its conserved quantities; λ² are the
 roots of a polynomial of degree one (of Ω alone, where γ does not enter its rates) or two, of rational coefficients.
 A positive or complex root proves the motion unstable, at the rate max Re λ.  The absence of such a root proves nothing
 by itself.  A free body of two equal moments that turns about an axis between them is unstable without one: its Jordan
@@ -152,7 +152,7 @@ def is_stable(p: Parameters, y: Sequence[Any], sign: Callable[[Any], int | None]
     """Whether a second variation is definite: Ω and γ of every motion that starts close enough then stay close.
 
     That is so in all six variables: a definite form on the level of integrals becomes so everywhere with multiples of
-    the squares of what these are off.  Exact in any ring with its ``sign``, which may not know.
+    the squares of their deviations.  Exact in any ring with its ``sign``, which may be undecided.
     """
     for squares, zeros, hessian in _second_variations(p, y):
         if all(sign(square) == 1 for square in squares) and all(sign(zero) == 0 for zero in zeros):

@@ -185,8 +185,8 @@ def goryachev_motion(
 #     b3 = (1 − C)/((1 − 2B)(B − C)),   c3 = −(1 − B)/((1 − 2C)(B − C))
 #     c1/b1 = (2B − 3)(2B − 1)(16B − 9)²/(12B (5B − 3))
 #
-# b1 is a unit of time, M·γ = 0.  With x³ = Ω1, Ω2 = x √(b1 + b3 x⁴) and Ω3 = x √(c1 + c3 x⁴) nothing is raised to a
-# broken power; at x = 0 the top is at rest with γ level.  Motions of rigid bodies are real for 3/2 < B < 1.5966, b1 >
+# b1 is a unit of time, M·γ = 0.  With x³ = Ω1, Ω2 = x √(b1 + b3 x⁴) and Ω3 = x √(c1 + c3 x⁴) all powers are
+# integers; at x = 0 the top is at rest with γ level.  Motions of rigid bodies are real for 3/2 < B < 1.5966, b1 >
 # 0. Source: S. A. Chaplygin, Trudy otd. fiz. nauk 12 (1904) 1, by the form of the solution; derived here from the
 # equations, which :class:`heavytop.exact.cases.one_interval.IntervalCurve` tests exactly.
 

@@ -9,10 +9,10 @@ so that the plane vectors (2A, Ω3) and (|g|, γ3) keep their lengths and their 
 
     b' = −(n × Ω)_3/|n|,   b'² = |w|² − A² = |w0|² cos b − N γ3(0) sin b − (A0 cos b − ½ Ω3(0) sin b)²
 
-y = tan(b/2)/|n| makes that y'² = a quartic with rational coefficients, y(0) = 0, which Biermann and Weierstrass solve
+With y = tan(b/2)/|n| y'² is a quartic with rational coefficients, y(0) = 0, which Biermann and Weierstrass solve
 (:mod:`heavytop.exact.elliptic.quartic`), and cos b, sin b/|n| follow from numerator and denominator of y, b' from their
-series. r may lie anywhere in the plane, |γ| be anything.  A double root of the quartic leaves hyperbolic or circular
-functions.
+series.  r may lie anywhere in the plane, and γ have any length.  A double root of the quartic means hyperbolic or
+circular functions.
 
 The homoclinic one of them starts at Ω = (0, 0, 2α), γ = (0, 0, 1) with P b = α² I1/2, the paper's own data:
 
@@ -58,7 +58,7 @@ from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 
-# Attitude of Delone's motions: the azimuth of :mod:`heavytop.exact.cases.kovalevskaya` where w2 stays 0.
+# Attitude of Delone's motions: the azimuth of :mod:`heavytop.exact.cases.kovalevskaya` where w2 = 0.
 #
 # In its units, and with k = 0, one separated variable is 0 and the other, w ≤ 0, has w'² = −2 ((w + h)(w² + G) − C²/2).
 # The level vector v has v² = 4e (q² w − e q²) and the azimuth Λ' = (l/2) (1 + e/(w − e)), e = l²/2 − h.  As

@@ -59,7 +59,7 @@ _LEAST = 128
 
 @dataclass(frozen=True, slots=True)
 class _Constants:
-    """a, b and what follows from them: Fractions, or balls."""
+    """a, b and the constants that follow from them: Fractions, or balls."""
 
     a: Any
     b: Any
@@ -178,7 +178,7 @@ def _axes(cosine: arb, sine: arb, side: arb) -> tuple[tuple[arb, arb, arb], ...]
 
 
 class _Moving(WithBearing):
-    """The base of the exact and the algebraic motions, with what both bring."""
+    """The base of the exact and the algebraic motions."""
 
     __slots__ = ()
 

@@ -8,7 +8,7 @@ m = (e_b − e_c)/p², u = p t + u0
     A_a² = (L² − 2E I_b)/(I_a (I_a − I_b)),
     A_b² = (L² − 2E I_a)/(I_b (I_b − I_a)),   A_c² = (L² − 2E I_a)/(I_c (I_c − I_a))
 
-with A_a A_b A_c of the sign that the equation for Ω_c asks for.  m = 0 is the symmetric top, m = 1 the separatrix.
+with A_a A_b A_c of the sign that the equation for Ω_c requires.  m = 0 is the symmetric top, m = 1 the separatrix.
 
 Attitude (Jacobi): the projection of e_b across M, which never vanishes, turns about M in space through ψ,
 

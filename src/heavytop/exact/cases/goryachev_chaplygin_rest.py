@@ -22,7 +22,7 @@ same formulas hold but for the sign of Ω1, γ2 and γ3.  With x = sδ/(B ± A),
     γ1 = (2h − u1² − u1u2 − u2²)/(2c)         γ2 = −κ ((e − γ2)(1 − p1⁴)/w1³ − (e + γ2)(1 − p2⁴)/w2³)/(c o)
     γ3 = 2 κ γ3 (1 − p1²p2²)/(c V o)
 
-The body comes to rest again at √a t = 4 K(m) and goes back the way that it came.  A start that is not at rest is some
+The body comes to rest again at √a t = 4 K(m) and retraces its path.  A start that is not at rest is some
 time after the rest: two elliptic integrals, from u1 and u2.
 
 *Attitude.*  M is level, and its azimuth Λ about γ has Λ' = |γ| n·M/|M|².  With y = x²

@@ -1,6 +1,6 @@
 """Grioli's regular precession of an asymmetric top, about an axis that is not vertical.
 
-The top: b = 0, (I2 − I3) a² = (I1 − I2) c², I1 ≠ I3: r stands across a circular section of the gyration ellipsoid.
+The top: b = 0, (I2 − I3) a² = (I1 − I2) c², I1 ≠ I3: r is normal to a circular section of the gyration ellipsoid.
 With n = P r, r̂ = n/|n|, D = I1 − I2 + I3, κ = n1 n3 (I1 − I3)/|n|², the body spins about r̂ and precesses about a
 unit vector u ⟂ r̂ fixed in space, both at the rate ν:
 

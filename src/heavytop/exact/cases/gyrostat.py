@@ -69,7 +69,7 @@ class Gyrostat(ClosedForm):
 
     @property
     def permanent(self) -> bool:
-        """Whether M is at rest in the body: ω ∥ M, or nothing moves."""
+        """Whether M is constant in the body: M × ω = 0."""
         return not any(cross(self.momentum, self.angular_velocity))
 
     def evaluate(self, time: Fraction) -> list[BallLike]:

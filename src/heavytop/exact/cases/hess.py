@@ -1,6 +1,6 @@
 """Hess' tops, M·γ ≠ 0: the height of the centre of mass is elliptic, the rest a linear system with its period.
 
-n = P r = (a, 0, c), N = |n|, with I1 (I2 − I3) a² = I3 (I1 − I2) c²: r stands across a circular section of the
+n = P r = (a, 0, c), N = |n|, with I1 (I2 − I3) a² = I3 (I1 − I2) c²: r is normal to a circular section of the
 ellipsoid of inertia of the moments 1/I.  M·n = 0 at the start then holds at all times.  In units with I2 = 1, with
 e_z = n/N, e_x = (c, 0, −a)/N, e_y, β = ac (1/I1 − 1/I3)/N², C0 = M·γ and the energy E,
 

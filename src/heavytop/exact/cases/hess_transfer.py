@@ -4,7 +4,7 @@ With s = m + d cos θ, ρ² = 2 (E − s), ω = K/ρ² and D = 1/√(2 (top − 
 
     du/dθ = b v,  dv/dθ = c u,   b = ½ (ω − βρ) D,   c = −½ (ω + βρ) D
 
-E and top lie above the gap; b and c are analytic but for cuts upwards from iβ and downwards from −iβ, and the same at
+E and top lie above the gap; b and c are analytic except on cuts upwards from iβ and downwards from −iβ, and the same at
 2π, 4π, ..., where cosh β = (E − m)/d.
 
 *Without roots.*  About a place x let z = tan ½(θ − x) and w = 1 + z².  Then ρ² = P/w and 2 (top − s) = Q/w with
@@ -26,7 +26,7 @@ largest on the circle, which is covered by balls.  A solution with |u|, |v| ≤ 
 and at most e^(κr) (Gronwall's lemma along a radius), so that its Taylor coefficients are at most e^(κr)/r^n, and what
 follows the first L terms at a distance δ < r is at most e^(κr) (δ/r)^L/(1 − δ/r); for V that times the largest √|w/Q|.
 Segments reach r/R to either side of their places and grow away from 0 with the discs; where κr is large they are
-shorter.  There are log(1/β) of them for small β (M·γ all but 0) and κ for large κ (moments of very different size):
+shorter.  There are log(1/β) of them for small β (M·γ near 0) and κ for large κ (moments of very different size):
 both are counted before any of them is computed.
 
 *The matrix.*  Y(θ), Y(0) = 1, is the product over segments of 0 ≤ θ ≤ π.  b and c are even, so with J = diag(1, −1)
@@ -59,7 +59,7 @@ _GUARD, _BLOCK = 32, 16
 """Guard bits; terms that are computed in the same bits."""
 MOST_SEGMENTS = 96
 _MOST_WORK, _WORK_BITS = 16384, 256
-"""Segments times the square of the working precision over so many bits: some 15 s of one core."""
+"""The largest cost, segments times (working precision/:data:`_WORK_BITS`)²: some 15 s of one core."""
 Quadratic = tuple[arb, arb, arb]
 
 

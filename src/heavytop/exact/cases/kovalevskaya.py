@@ -291,7 +291,7 @@ class AbelMotion:
         """(N'D − ND')/(h_10 h_20)."""
         v1, v2 = (g.position(x) for g, x in zip(self.line.variables, phases, strict=True))
         speeds = self._speeds(v1, v2)
-        # v2/h_20 = s h_20, and what is left of θ1' but for 1/h_10
+        # v2/h_20 = s h_20, and θ1' without its factor 1/h_10
         rates = (
             acb_series(speeds[0]) * second[0] * self._side(1, 0),
             acb_series(-speeds[1]) * first[0] * self._side(0, 0),
@@ -394,7 +394,7 @@ def start_phases(start: WorkingStart, mu: arb, variables: Sequence[Variable]) ->
 #
 #     M·v = fX,   M·b = −2qf,   X = −2pr/l − (l² − 4p²)/(lq) (log f)',   f' = −aq (r − lγ^3)
 #
-# and (log f)' is known however small f is (:meth:`AbelMotion.approach`), so that M stands in the place of v.
+# and (log f)' is known for any small f (:meth:`AbelMotion.approach`), so that M replaces v.
 #
 # Derived here: the vector by fitting polynomials to motions; v·γ, v² and Λ' are then proven as identities between
 # polynomials on |γ| = 1 (tests/exact/test_attitude.py).
@@ -578,7 +578,7 @@ def _thetas(case: Kovalevskaya) -> ThetaMotion:
 
 
 def _has_thetas(level: KovalevskayaLevel) -> bool:
-    """Whether the five roots are distinct, and far enough from each other at the working precision."""
+    """Whether the five roots are distinct and separated at the working precision."""
     values = [root.value for root in roots(level)]
     return len(values) == 5 and separation(values) >= SEPARATION
 

@@ -329,7 +329,7 @@ def _from_root(roots: Sequence[acb], near: int, w: arb, y: arb) -> Pair:
         return acb(0), acb(0)
     factor = 2 * step / y
     if not factor.is_finite():
-        # beside a turning point: |y|² = 2 |w − e| Π |w − x|
+        # near a turning point: |y|² = 2 |w − e| Π |w − x|
         square = 2 * abs(step)
         for _, scale in others:
             square /= abs(scale)

@@ -174,7 +174,7 @@ class Lagrange(ClosedForm):
 
 
 def _sides(h: acb, slope: acb, g: acb, w: acb, x: arb, size: arb) -> tuple[acb, acb]:
-    """(Z₊, Z₋) from the three equations, without dividing by what vanishes at a pole."""
+    """(Z₊, Z₋) from the three equations, with divisors that do not vanish at a pole."""
     weight = abs(g) ** 2 + abs(w) ** 2
     if x > 0:
         plus = h * g / (x + size)

@@ -54,7 +54,7 @@ _SEARCH_BITS = 64
 
 @dataclass(frozen=True, slots=True)
 class IntervalCurve:
-    """Q, R and what follows from them; made by :meth:`of`.
+    """Q, R and the polynomials that follow from them; made by :meth:`of`.
 
     inertia: (A, B, C).  power: k.  speed: K.  heights: S, T, U.
     """
@@ -137,7 +137,7 @@ class OneGapMotion:
     """A motion on a curve at one working precision.
 
     rests: Q and R without the ends of the gap.  stops: the lower end and the upper end.  others: the other roots of QR.
-     origin: Abel's integral at t = 0.  signs: of √Q and √R with their half angles.
+    origin: Abel's integral at t = 0.  signs: of √Q and √R with their half angles.
     """
 
     curve: IntervalCurve
@@ -282,7 +282,7 @@ def _moments(top: HeavyTop, _start: State) -> Sequence[Fraction]:
 
 
 def _height(top: HeavyTop, start: State) -> tuple[Fraction, Fraction]:
-    """E0 of Ω2² = b0 + b2 Ω1², for A = 1 in the units of :func:`_units`, and what Ω3² lacks then."""
+    """E0 of Ω2² = b0 + b2 Ω1², for A = 1 in the units of :func:`_units`, and the defect of Ω3² for it."""
     rate, _ = _units(top, start)
     p, q, r = (w / rate for w in start.omega)
     b2, b0, c2, c0 = quadratics(Fraction(1), top.inertia[1] / top.inertia[0], top.inertia[2] / top.inertia[0])
@@ -318,7 +318,7 @@ class Steklov(WithBearing, ClosedForm):
 
     def __post_init__(self) -> None:
         ClosedForm.__post_init__(self)
-        # the Fourier series of Abel's integral may be too long; nor is it decided beside a turning point
+        # the Fourier series of Abel's integral may be too long, or the start too near to a turning point
         name = "Two moments of inertia all but satisfy an equality, or the start a turning point's"
         decide(lambda: _motion(self), name, _LEAST)
 

@@ -2,7 +2,7 @@
 
 The axis e, a unit vector, is principal where I e = K e: one of the three, any equatorial axis of a symmetric top, any
 axis at all of a spherical one.  Ω = w e stays along it only if the torque does: γ × n ∥ e, n = P r.  While w is not 0
-the part of γ across e turns, so that asks n·e = 0 and γ·e = 0, unless γ ∥ e ∥ n, which is a steady rotation.
+the part of γ across e turns, which requires n·e = 0 and γ·e = 0, unless γ ∥ e ∥ n, which is a steady rotation.
 With N = |n||γ| and x the angle of γ from −n in the plane across e, x' = −w:
 
     x'' = −(N/K) sin x,   h = ½ K w² + n·γ = ½ K x'² − N cos x

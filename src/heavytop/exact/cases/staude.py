@@ -4,7 +4,7 @@
 
     ω² = P (I γ × γ)·(r × γ) / |I γ × γ|²     where γ is not a principal axis; it must not be negative.
 
-On a principal axis that r lies on, every ω serves; on another one, none.  Turned about: P r = ω² I γ + κ γ gives
+On a principal axis through r every ω is possible; on another one, none.  Conversely P r = ω² I γ + κ γ gives
 every top that turns about γ at the rate ω; with a rotor of momentum k, P r = ω² I γ + ω k + κ γ.  Space turns about Ω
 in the body at the rate |Ω|.
 Source: O. Staude, J. reine angew. Math. 113 (1894) 318.

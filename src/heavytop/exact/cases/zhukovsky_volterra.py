@@ -8,7 +8,7 @@ pole of one function D, so that
     D(t) and D(t) Mi(t) are combinations of 1, ℘, ℘', ℘², ℘℘',
 
 over the rational numbers: t = 0 is a rational point of the curve.  They follow from the Taylor series of M(t) by linear
-equations: D Mi has no residue at t = 0 and goes on as its principal part says, up to t^5; an elliptic function with at
+equations: D Mi has no residue at t = 0 and agrees with its principal part up to t^5; an elliptic function with at
 most four poles that vanishes so often is 0.
 
 A vector Z = u + i M × u/G fixed in space, u ⟂ M, has in body axes components with the same poles.  Their zeros are

@@ -1,4 +1,4 @@
-"""x'² = f(x) for any real quartic f and any start, and functions of the second kind beside such a motion.
+"""x'² = f(x) for any real quartic f and any start, and functions of the second kind with the same periods.
 
 Every elliptic motion of the suite rests on two theorems.  Write f = a0x⁴ + 4a1x³ + 6a2x² + 4a3x + a4, c = f''(x0)/24,
 f' = f'(x0) and so on, y0 = x'(0), ℘ with the invariants of f, and D(t) = 2 (℘(t) − c)² − f f''''/48.
@@ -211,7 +211,7 @@ class Companions:
             slope_part = slope
             if self.wave.index is None:
                 slope_part = -exponential(point.time, self.wave.rate) * factor
-            # Φ' T² = K T ΦT − e: its K T ΦT stands in the cubic coefficient
+            # Φ' T² = K T ΦT − e: its K T ΦT is part of the cubic coefficient
             parts = low * square, low, steep, slope_part * square, slope
         else:
             p = lift(point.high + point.root * point.square)

@@ -89,9 +89,9 @@ from heavytop.top.equations import Parameters, System
 #
 #     Δ = Σ_{n < N} ρ_n + Σ_{n ≥ N} h (2q Σ_{j+k=n} β_j ν_k + l ν_n + q_G Σ_{j+k=n} β_j β_k + l_G β_n)/(n + 1).      (a)
 #
-# *Theorem.*  A motion y of the step stays within W of p (integers go on with the b_n until the columns are small too: W
+# *Theorem.*  A motion y of the step stays within W of p (integers have further b_n until the columns are small too: W
 # is larger by the sum of those), so that R = Σ β_n + W bounds both, and Λ = h (2q (Σ β_n/(n + 1) + W) + l) the integral
-# of |h Df(y)|.  For the column u along y that v stands for,
+# of |h Df(y)|.  For the column u along y that v approximates,
 #
 #     |u − v| ≤ e^Λ (Δ + h W (2q Σ ν_n + 2 q_G R + l_G)),                                                           (b)
 #

@@ -2,11 +2,10 @@
 
 All norms are maximum norms, and time is scaled so that a step goes over 0 ≤ τ ≤ 1: y' = h f(y).
 
-*The polynomial* p(τ) = Σ b_n τⁿ has integers in units of 2^-p ("ulps") as coefficients, exactly:
-b_{n+1} is h f_n/(n + 1) within ρ_n, f_n the coefficient of τⁿ in f(p): ρ_n is half an ulp where they are made of
-exact integers, and what :mod:`heavytop.multiword.fixed_point.certified_series` proves where they are made of words.
-What p lacks to be a motion is its defect p' − h f(p) = Σ E_n τⁿ, and that is known.  For n < N, |E_n| ≤ (n + 1) ρ_n;
-for n ≥ N, E_n = −h f_n with |f_n| ≤ q Σ_{j+k=n} β_j β_k + l β_n, β_j = |b_j|.  Hence the integral of |defect| from 0 to
+*The polynomial* p(τ) = Σ b_n τⁿ has integers in units of 2^-p ("ulps") as coefficients, exactly: b_{n+1} is
+h f_n/(n + 1) within ρ_n, f_n the coefficient of τⁿ in f(p); ρ_n is half an ulp for exact integers, and the bound of
+:mod:`heavytop.multiword.fixed_point.certified_series` for words.  Its defect p' − h f(p) = Σ E_n τⁿ is known.  For
+n < N, |E_n| ≤ (n + 1) ρ_n; for n ≥ N, E_n = −h f_n with |f_n| ≤ q Σ_{j+k=n} β_j β_k + l β_n, β_j = |b_j|.  Hence the integral of |defect| from 0 to
 τ is at most
 
     D = Σ_{n < N} ρ_n + Σ_{n ≥ N} h (q Σ_{j+k=n} β_j β_k + l β_n)/(n + 1).                                        (a)
@@ -400,7 +399,7 @@ def coefficient_bound(field: Quadratic, size: Fraction) -> Fraction:
 def start_node(field: Quadratic, start: tuple[Fraction, ...], precision: int, errors: Sequence[Fraction] = ()) -> Node:
     """The node at time 0 of the motion from ``start``, rounded to ulps of 2^-precision.
 
-    errors: how far each component of the true start may be from it; none where it is exact.
+    errors: bounds of the error of each component; empty for an exact start.
     """
     scaled = [value * 2**precision for value in start]
     centre = tuple(mpz(round(value)) for value in scaled)
@@ -467,7 +466,7 @@ def _tail(field: Quadratic, node: Node, series: StepSeries, precision: int) -> _
         return None
     factor, scale = exp(growth) * _UP, node.errors.exponent
     defect = defect_bound(series, precision, h * q, h * slope)
-    # what the field itself lacks: |y' − f(y)| on the true motion
+    # the error of the field: |y' − f(y)| on the true motion
     lacking, exponent = field.slack
     defect = np.ldexp(defect, -scale) + np.ldexp(h * lacking * _UP, exponent + precision - scale) + _TINY
     bound = (float(node.errors.sizes().max()) + defect) * factor * _UP

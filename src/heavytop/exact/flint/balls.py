@@ -419,7 +419,7 @@ def ball_text(value: arb) -> str:
     """A ball as text, ``m e r s`` for m 2^e ± r 2^s, or ``nan``; :func:`ball_from` restores the same ball."""
     if not value.is_finite():
         return "nan"
-    # Decimal, as Python refuses to write or read an int of more than 4300 digits, or of what the process set
+    # Decimal, as Python limits the digits of an int in text
     return " ".join(str(Decimal(int(part))) for part in (*value.mid().man_exp(), *value.rad().man_exp()))
 
 
@@ -500,7 +500,7 @@ def to_bits(
     time: of the evaluation; its size costs bits, and the precision is then a multiple of 64, so that lattices are
     cached.
     length: of power series.
-    Raises OutOfReach where even a precision of 16 times the asked bits plus 4096, or of 32768, does not give them.
+    Raises OutOfReach where even a precision of 16 times ``bits`` plus 4096, or of 32768, does not suffice.
     """
     extra = -1 if time is None else _GUARD + (abs(time.numerator) // time.denominator).bit_length()
     working, smallest = bits + 32, -16 * bits - 4096

@@ -20,7 +20,7 @@ from heavytop.multiword.codegen import code_cache
 
 try:
     from llvmlite import ir as ir  # also for the modules that write code
-except ModuleNotFoundError:  # types and lengths are used without the extra; what would be compiled asks for it
+except ModuleNotFoundError:  # types and lengths need no extra; compiling does
     ir = Stub()
 
 Doubles = NDArray[numpy.float64]

@@ -55,7 +55,7 @@ LARGEST_TIME = Fraction(2) ** 1000
 SMALLEST_TIME = 1 / LARGEST_TIME
 """The least target: a smaller one would be 0 in two doubles, and no step would be taken."""
 _STEPS_AT_ONCE, _SAMPLES_AT_ONCE = 1024, 2048
-"""Steps and samples of a call: the words of so many samples fit into a cache near the processor."""
+"""Steps and samples of a call: the words of the samples fit into a cache near the processor."""
 PLACES = (*range(6), *range(19, 22))
 """Offsets of the first words of Ω, γ and ξ; the second follow 8 doubles later."""
 

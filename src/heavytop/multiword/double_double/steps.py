@@ -50,7 +50,7 @@ from heavytop.top.equations import System
 # Taylor orders between double-double and plain doubles: coefficients split in two.
 #
 # y_m = a + b, where a is a multiple of a unit 2^e_m and |y_m| <= 2^21 units, and b a double of half a unit at most.
-# But for its rounding e_m is linear in m, so that the products of series that make S_n have a common unit: products and
+# Up to rounding e_m is linear in m, so that the products in S_n have a common unit: products and
 # sums of a are exact in plain doubles.  With L = a + b, and R likewise,
 #
 #     S_n = Σ a_m a_(n−m) + Σ (a_m b_(n−m) + b_m R_(n−m)),
@@ -72,7 +72,7 @@ _MOST_UNIT_BITS, STEEPEST = 400, 8
 _SPARSE, _ROOM = 2.0**-6, 8.0
 """The least share of 2^21 units in use; the next units have room for four to eight times the largest coefficient."""
 SLACK, TOLERATED_SLOPE = 0.25, 0.375
-"""Excess of the slope over log2 of the inverse radius, and what it may have too much beside that."""
+"""Excess of the slope over log2 of the inverse radius, and its tolerance."""
 MOST_TRIES = 3
 _FRACTION_BITS, _BIAS = 52, 1023
 _EXPONENT = ((1 << 11) - 1) << _FRACTION_BITS
@@ -94,7 +94,7 @@ def splits(code: Code, units: list[Operand], slope: Operand) -> Operand:
 
 
 def in_range(unit: Operand) -> Operand:
-    """Whether 1.5 · 2^52 units are far from the ends of the exponents of doubles, lane by lane."""
+    """Whether 1.5 · 2^52 units are far from underflow and overflow, lane by lane."""
     low, high = (2.0 ** (_FRACTION_BITS + sign * _MOST_UNIT_BITS) for sign in (-1, 1))
     return (unit > low) & (unit < high)
 
@@ -184,7 +184,7 @@ def judged(code: Code, units: list[Operand], largest: list[Operand]) -> tuple[Op
 
 
 def near(slope: Operand, suggested: Operand) -> Operand:
-    """Whether units that rise with ``slope`` are fine enough where ``asked`` is wanted, a bit."""
+    """Whether units with this slope are fine enough where another is suggested, a bit."""
     return slope - suggested < int(TOLERATED_SLOPE * 2**SLOPE_BITS)
 
 
@@ -315,12 +315,12 @@ class SplitOrders:
 
 
 TIME, TIME_LOW, TARGET, TARGET_LOW, BEGAN, BEGAN_LOW, SIGN, ROOM, REACH, DEPTH, CLOCK = range(11)
-"""Places of the clock, doubles: |time| and its target and the beginning of the last step, in two words each; the
-direction; log2 of the rounding allowed above n0, in units of 2^-53; log2 of h/ρ; log2 of what the products of the units
-of split coefficients may be beside the state."""
+"""Indices of the clock, doubles: |time|, its target and the beginning of the last step, in two words each; the
+direction; log2 of the rounding allowed above n0, in units of 2^-53; log2 of h/ρ; log2 of the largest products of the
+units of split coefficients over the state."""
 ORDER, LOW_ORDER, LEAST, MOST, STATUS, USED, TRIES, SLOPE, USED_TRIES, USED_SLOPE, COUNTS = range(11)
-"""Places of the counts: N, n0 of the next step, bounds of n0, how the last step ended, its n0; how often the next step
-was tried in split coefficients, and the slope of their units; the same of the last step."""
+"""Indices of the counts: N, n0 of the next step, bounds of n0, the outcome of the last step, its n0; the tries of the
+next step in split coefficients, and the slope of their units; both of the last step."""
 OK, NON_FINITE, TOO_SMALL = range(3)
 AT_ONCE = 4
 """Samples that are evaluated together, as the operations of one depend on each other."""

@@ -7,7 +7,7 @@ with i + j = k:
 
     S' = fma(a_i, b_j, S_k),   d = S' − S_k,   l = fma(a_i, b_j, −d),   S_(k+1) += l.
 
-d and l are exact, and l is a multiple of g_(k+1): nothing is lost but in the last level, as long as each S_k stays
+d and l are exact, and l is a multiple of g_(k+1): only the last level is inexact, as long as each S_k stays
 between 2^52 g_k and 2^53 g_k wherever a low part is added to it.  That is checked there, by the exponent: the bits of
 S ^ C are accumulated, and a set exponent bit means that the step must be rejected.
 

@@ -12,7 +12,7 @@ where the coefficients of the field are stored over 2^e.  ε_n, ε', κ are give
 order T K ulp.  The sum of (2) over n < N bounds the integral of the defect over the step: :attr:`Series.rounding`.
 
 *Sums of products.*  Let l_i and r_j bound the words L_i and R_j of all orders in a lane, and m_ij = l_i r_j.  A sum for
-level k begins at C_k and takes in, product by product, x → s = fl(x + a b), d = fl(s − x), l = fl(a b − d); then lows.
+level k begins at C_k and adds, product by product, x → s = fl(x + a b), d = fl(s − x), l = fl(a b − d); then lows.
 Suppose, for all k < K − 1,
 
     Σ_(i+j=k) m_ij + 3 max_(i+j=k) m_ij ≤ 2^52 (1 − 2^-20) g_k.                                                  (1)
@@ -38,7 +38,7 @@ a lane, and there A = ½: hence 2 ε_n.  The coefficients are wrong by g/2 at mo
 2^51 g_0 (1 + 2^(1−b)): κ = 1.01 T 2^(50−b) g.
 
 *Other operations.*  Carries, gathering and multiplication by 16 are exact for words below 2^51 units, which is watched
-for the first.  Multiplication by the power of two that is left passes what is below a unit on to the next word, exactly
+for the first.  Multiplication by the remaining power of two adds the part below a unit to the next word, exactly
 where that power is 2^-b at least, and drops g/2 at most in the last.  The division passes on the exact remainder: a
 quotient is right to ½ unit and 2^-53 of itself, that is ¾ of a unit, and the last remainder is dropped.  Dividends
 behind the first word are below 2^53 units (watched), so that from n = 3 on their quotients are below 2^51; before that

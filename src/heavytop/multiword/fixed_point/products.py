@@ -279,7 +279,7 @@ def _call(code: Code, tiles: list[ir.Function], levels: Operand, arguments: list
 # truncation to J digits, is at most n (J + 1)/4 units of the last word.
 #
 # From some order on the first z digits are 0: |y| ≤ u_(z−1)/8 is enough, for L and R are at most twice as large, and
-# what lies behind digit z is at most 0.51 u_(z−1).  S_n begins at level s = min_m z(m) + z(n − m), and the pair
+# the part after digit z is at most 0.51 u_(z−1).  S_n begins at level s = min_m z(m) + z(n − m), and the pair
 # (m, n − m) with digit z(m) on the left and digit s − z(m) on the right.  That is at most two before the first
 # digit, where zeros are.  Digits of a left side beyond its last one then meet these zeros.
 
@@ -330,7 +330,7 @@ class DigitRows(Rows):
             digit = code.load(at, LANES * (_BEFORE + count * (1 + vector) + j))
             value = digit * 2.0**exponent
             k = min(max(0, -(exponent // grid.bits) - 1), grid.words - 1)  # the first word whose unit is no larger
-            if k:  # what is large beside that unit goes to the word before
+            if k:  # the large part goes to the word before
                 big = code.constant(grid.centre(k - 1))
                 high = value + big - big
                 words[k - 1] += high
@@ -515,7 +515,7 @@ class WordRows(Rows):
         def begin(k: Operand, _: list[Operand]) -> None:
             code.store_one(n, self.places, k + 1)
 
-        # several at once, where the first order is far smaller than the state
+        # several at once where the first order is far smaller than the state
         code.loop(zeros, zeros_after, begin, [])
         folded: list[Operand] = []
         for v in range(self.vectors):

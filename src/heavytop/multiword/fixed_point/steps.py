@@ -189,7 +189,7 @@ class SeriesCode:
             if second:
                 parts = [[code.shuffle(word, code.zero, half) for half in _HALVES] for word in linear]
                 linear = [one + other for one, other in parts]
-            if k > 1:  # sums of more products than two beside the first would outgrow their words
+            if k > 1:  # sums of more than three products would overflow their words
                 rates = carried(code, grid, rates)
             rates = [a + b for a, b in zip(rates, linear, strict=True)]
         return rates
@@ -207,7 +207,7 @@ class SeriesCode:
     def sources(
         self, vector: int, gathered: list[Operand], y: list[Operand]
     ) -> list[tuple[list[Operand], list[Operand]]]:
-        """The words of A and each B, and what they are multiplied by."""
+        """The words of A and each B, each with its factor."""
         linear = permutations(self.system)
         sources = [gathered, *([self.code.shuffle(word, self.code.zero, lanes) for word in y] for lanes in linear)]
         return [(self._constants((1 + len(linear)) * vector + k), source) for k, source in enumerate(sources)]
@@ -352,10 +352,10 @@ def write_samples(module: ir.Module, grid: Grid, vectors: int) -> ir.Function:
 
 
 TIME, TARGET, BEGAN, SIGN, CLOCK = range(5)
-"""Places of the clock, doubles: |time|, its target, the beginning of the last step; the direction."""
+"""Indices of the clock, doubles: |time|, its target, the beginning of the last step; the direction."""
 HALVINGS, FEWEST, MOST, STATUS, ORDERS, REDONE, EXCESS, COUNTS = range(8)
-"""Places of the counts: −log2 h of the next step and its bounds, how the last one ended, its orders, steps redone;
-log2 of what the constants were divided by."""
+"""Indices of the counts: −log2 h of the next step and its bounds, the outcome of the last one, its orders, repeated
+steps; log2 of the divisor of the constants."""
 OK, TOO_SMALL, CAPACITY = 0, 2, 3
 _MANY_ORDERS, _FEW_ORDERS = 0.53, 0.34
 

@@ -1,1 +1,1 @@
-"""Taylor coefficients in integers of any length, beyond what the words of a double hold."""
+"""Taylor coefficients in integers of any length, for precisions beyond those of words."""
