@@ -5,8 +5,8 @@ All norms are maximum norms, and time is scaled so that a step goes over 0 ≤ �
 *The polynomial* p(τ) = Σ b_n τⁿ has integers in units of 2^-p ("ulps") as coefficients, exactly: b_{n+1} is
 h f_n/(n + 1) within ρ_n, f_n the coefficient of τⁿ in f(p); ρ_n is half an ulp for exact integers, and the bound of
 :mod:`heavytop.multiword.fixed_point.certified_series` for words.  Its defect p' − h f(p) = Σ E_n τⁿ is known.  For
-n < N, |E_n| ≤ (n + 1) ρ_n; for n ≥ N, E_n = −h f_n with |f_n| ≤ q Σ_{j+k=n} β_j β_k + l β_n, β_j = |b_j|.  Hence the integral of |defect| from 0 to
-τ is at most
+n < N, |E_n| ≤ (n + 1) ρ_n; for n ≥ N, E_n = −h f_n with |f_n| ≤ q Σ_{j+k=n} β_j β_k + l β_n, β_j = |b_j|.  Hence the
+integral of |defect| from 0 to τ is at most
 
     D = Σ_{n < N} ρ_n + Σ_{n ≥ N} h (q Σ_{j+k=n} β_j β_k + l β_n)/(n + 1).                                        (a)
 
