@@ -110,7 +110,7 @@ def quaternion_products(rows: Rows[Real]) -> tuple[tuple[Real, ...], ...]:
     )
 
 
-def _multiple_of_quaternion(rows: Rows[Real]) -> tuple[Real, ...]:
+def multiple_of_quaternion(rows: Rows[Real]) -> tuple[Real, ...]:
     """4 c q with c the largest component of q: c² is at least 1/4, so that no digits are lost."""
     products = quaternion_products(rows)
     return products[max(range(4), key=lambda index: float(products[index][index]))]
@@ -118,7 +118,7 @@ def _multiple_of_quaternion(rows: Rows[Real]) -> tuple[Real, ...]:
 
 def quaternion_of_rows(rows: Rows[Real], lib: Library) -> tuple[Real, Real, Real, Real]:
     """(w, x, y, z) of length 1, of the sign in which its largest component is positive."""
-    multiple = _multiple_of_quaternion(rows)
+    multiple = multiple_of_quaternion(rows)
     length = lib.sqrt(sum(value * value for value in multiple))
     w, x, y, z = (value / length for value in multiple)
     return w, x, y, z
@@ -126,7 +126,7 @@ def quaternion_of_rows(rows: Rows[Real], lib: Library) -> tuple[Real, Real, Real
 
 def near_quaternion(rows: Rows[Fraction], bits: int) -> tuple[Fraction, ...]:
     """The quaternion of rational rows, in rationals, of length 1 to within 2^-bits."""
-    multiple = _multiple_of_quaternion(rows)
+    multiple = multiple_of_quaternion(rows)
     square = sum((value * value for value in multiple), Fraction(0))
     length = Fraction(isqrt((square.numerator << 2 * bits) // square.denominator), 1 << bits)
     return tuple(value / length for value in multiple)
@@ -273,7 +273,7 @@ class Attitude:
         if off > (Fraction(1, 100) if normalize else 0):
             raise InputError(f"The matrix is not orthogonal: an entry of R R^T - 1 is {_size(off)}.", _NORMALIZE)
         if off:
-            return cls.quaternion(*_multiple_of_quaternion(entries), normalize=True)
+            return cls.quaternion(*multiple_of_quaternion(entries), normalize=True)
         return cls("matrix", tuple(value for row in entries for value in row))
 
     @classmethod
@@ -331,7 +331,7 @@ class Attitude:
         lib = mpmath.MPContext()
         lib.prec = bits
         rows = self.rows(lib, lambda value: lib.mpf(value.numerator) / value.denominator)
-        return tuple(exact(value) for value in _multiple_of_quaternion(rows))
+        return tuple(exact(value) for value in multiple_of_quaternion(rows))
 
     def exact_rows(self) -> Three[Vector] | None:
         """R in exact rationals; None where some entry may be irrational."""

@@ -6,11 +6,13 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import reduce
 from itertools import pairwise
 from typing import Any
 
 import msgspec
 import numpy
+from flint import arb
 
 from heavytop.cases import Case
 from heavytop.errors import HeavyTopError
@@ -24,7 +26,6 @@ from heavytop.harness.rows import Task, computed_row, data_of, seconds_a_step
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.attitude_error import FORMS, ObservedScorer
-from heavytop.measure.running import RunningStatistics, Sums
 from heavytop.measure.scalar import (
     GUARD_BITS,
     RELATIVE,
@@ -32,6 +33,8 @@ from heavytop.measure.scalar import (
     digits_kept,
     digits_of,
     digits_right,
+    larger,
+    metric,
     relative_error,
     roundings,
     to_ball,
@@ -39,7 +42,7 @@ from heavytop.measure.scalar import (
 from heavytop.measure.scorer import SOLUTION_ERROR, DriftAndError, Scorer
 from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE_DOUBLE, Precision, decimal_text, dot, exact, plain_decimal, round_to, time_text
-from heavytop.records import Metric, Peer, Quantity, Row, RowKey, Subject, by_name
+from heavytop.records import Metric, Peer, Row, RowKey, Subject, by_name
 
 Progress = Callable[[], None]
 
@@ -371,19 +374,18 @@ def _peer(trajectory: GivenTrajectory, measured: Scored, count: int, progress: P
     precision, problem, known = trajectory.precision, measured.problem, measured.scorer.truth
     if isinstance(known, str) or not count or precision == DOUBLE_DOUBLE:
         return None
-    running, bits = RunningStatistics(), precision.bits + GUARD_BITS
+    errors, bits = list[arb](), precision.bits + GUARD_BITS
     limit = max(1, int(_EFFORT / seconds_a_step(precision.bits)))
 
     @whole_evaluation
-    def including(time: Fraction, state: Sequence[object]) -> Sums:
+    def error(time: Fraction, state: Sequence[object]) -> arb:
         true = known.state(time, bits)[: len(state)]
         with working_precision(bits):
-            off = [to_ball(value) - ball for value, ball in zip(state, true, strict=True)]
-            return running.including([relative_error(off, true)])
+            return relative_error([to_ball(value) - ball for value, ball in zip(state, true, strict=True)], true)
 
     def observe(time: Fraction, state: Sequence[object]) -> None:
         if known.covers(time):
-            running.update(including(time, state))
+            errors.append(error(time, state))
         progress()
 
     top, start = problem.given or (problem.top, problem.start)
@@ -398,13 +400,12 @@ def _peer(trajectory: GivenTrajectory, measured: Scored, count: int, progress: P
         run = propagate(top, start, times, precision, **options)
     except HeavyTopError:  # a format that this platform lacks, or numbers outside its range
         return None
-    with working_precision(bits):
-        figures = running.metrics(Quantity(RELATIVE.name, RELATIVE.component))
-    metrics = by_name({RELATIVE: figures[RELATIVE]})
-    digits = digits_kept(msgspec.structs.replace(measured.row, metrics=metrics))
-    if run.outcome is not Outcome.SUCCESS or digits is None:
+    if run.outcome is not Outcome.SUCCESS or not errors:
         return None
-    return Peer(PEER, precision.name, digits, run.steps)
+    with working_precision(bits):
+        metrics = by_name({RELATIVE: metric(reduce(larger, errors, arb(0)))})
+    digits = digits_kept(msgspec.structs.replace(measured.row, metrics=metrics))
+    return None if digits is None else Peer(PEER, precision.name, digits, run.steps)
 
 
 def passed(row: Row, needed: Fraction | None, cut: str = "") -> bool | None:

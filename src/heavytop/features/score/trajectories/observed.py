@@ -29,7 +29,7 @@ from heavytop.precision import (
     round_to,
     shown,
 )
-from heavytop.top.attitude import Angle, Attitude, perpendicular, quaternion_products, rotated
+from heavytop.top.attitude import Angle, Attitude, multiple_of_quaternion, perpendicular, rotated, rotation_of
 from heavytop.top.bodies import CENTRE, IDENTITY, Body
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, VARIABLES, System, system_of
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
@@ -176,19 +176,7 @@ def _orthogonal(raw: RawStart, said: Convention, precision: Precision) -> Rows:
         angles = tuple(Angle(value, raw.degrees) for value in raw.values)
         return Attitude("euler", angles=angles, sequence=said.sequence).rational_rows(precision.bits + _SPARE_BITS)
     plain = replace(said, matrix="body_to_space") if raw.form == "plain" else said
-    return of_quaternion(nearest_quaternion(plain.rotation("matrix", raw.values, None)))
-
-
-def of_quaternion(q: Sequence[Fraction]) -> Rows:
-    """R of a quaternion w, x, y, z of any length, exactly."""
-    first, second, third = (tuple(row) for row in Convention().rotation("quaternion", q, None))
-    return first, second, third
-
-
-def nearest_quaternion(rows: Sequence[Sequence[Fraction]]) -> list[Fraction]:
-    """w, x, y, z of the direction of a rotation matrix, of no unit length; by the largest of the four."""
-    first, second, third = map(_triple, rows)
-    return list(max(enumerate(quaternion_products((first, second, third))), key=lambda pair: pair[1][pair[0]])[1])
+    return rotation_of(multiple_of_quaternion(plain.rotation("matrix", raw.values, None)))
 
 
 def require_direction(values: Sequence[Fraction], what: str) -> None:
@@ -468,8 +456,8 @@ def _normalized(name: str, rows: list[tuple[Fraction, ...]], said: Convention) -
         return [unit(row) for row in rows]
     if name != "matrix":
         return rows
-    squares = [nearest_quaternion([row[0:3], row[3:6], row[6:9]]) for row in rows]
-    return [tuple(entry for row in of_quaternion(unit(quaternion)) for entry in row) for quaternion in squares]
+    quaternions = [unit(multiple_of_quaternion([row[0:3], row[3:6], row[6:9]])) for row in rows]
+    return [tuple(entry for row in rotation_of(quaternion) for entry in row) for quaternion in quaternions]
 
 
 def unit(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
