@@ -17,7 +17,7 @@ from flint import arb
 from heavytop.cases import Case
 from heavytop.errors import HeavyTopError
 from heavytop.exact.flint.balls import whole_evaluation, working_precision
-from heavytop.features.score.diagnose.readings import Seen, disagreement
+from heavytop.features.score.diagnose.readings import Observations, disagreement
 from heavytop.features.score.diagnose.samples import FileAxes, turning_rate
 from heavytop.features.score.diagnose.search import WORTH_ASKING, Diagnosis, rounded
 from heavytop.features.score.trajectories.observed import GivenTrajectory, Observed
@@ -124,7 +124,7 @@ def _frame(observed: Observed) -> FileAxes:
     return FileAxes(axes, observed.posed.xi if set(FORMS) & set(observed.names) else None, tuple(columns))
 
 
-def _in_axes_of_file(seen: Seen) -> list[tuple[Any, ...]]:
+def _in_axes_of_file(seen: Observations) -> list[tuple[Any, ...]]:
     """Ω, γ and, of an attitude, ξ of each sample in the axes of the file; None for what it does not give."""
     unknown, said, columns = numpy.full((len(seen.times), 3), numpy.nan), seen.said, seen.columns
     form = next((form for form in FORMS if form in columns), None)
@@ -150,7 +150,7 @@ def _lengths(observed: Observed, times: Sequence[Fraction], precision: Precision
     return Diagnosis("quaternion_length", {"off": size, "t": plain_decimal(times[worst], 6)}, float(off[worst]))
 
 
-def _disagreements(seen: Seen, times: Sequence[Fraction]) -> list[Diagnosis]:
+def _disagreements(seen: Observations, times: Sequence[Fraction]) -> list[Diagnosis]:
     """Columns that say the same and differ."""
     with numpy.errstate(all="ignore"):
         apart = disagreement(seen)

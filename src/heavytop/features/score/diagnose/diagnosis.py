@@ -1,7 +1,7 @@
-"""Mistakes in a motion that is off, told by trying them: a supposition counts only if it explains the states.
+"""Diagnosis of a trajectory that is off: each hypothesis is a motion that is computed and compared with the states.
 
-Every supposition is a motion that is computed and compared with the states.  It is told if the error falls by two
-decades with it, by three where a number was fitted to the states; otherwise nothing is said.
+A hypothesis is accepted if the error falls by two decades, by three where a number was fitted to the states; otherwise
+nothing is said.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from sys import float_info
 import numpy
 
 from heavytop.features.score.diagnose import hypotheses
-from heavytop.features.score.diagnose.conventions import Suppositions
-from heavytop.features.score.diagnose.readings import Seen, of_states
+from heavytop.features.score.diagnose.conventions import ConventionSearch
+from heavytop.features.score.diagnose.readings import Observations, of_states
 from heavytop.features.score.diagnose.samples import (
     AS_AT_START,
     MOST_AT_ONCE,
@@ -43,7 +43,7 @@ from heavytop.top.equations import System, holding
 from heavytop.top.heavy_top import HeavyTop, State
 
 _WRONG = 1e-3
-"""Smaller ones are not those of other equations."""
+"""Relative errors below it are not those of other equations."""
 _TOO_FAR = 1.0
 """Taken for the error where heyoka does not get to the times."""
 _CONSTANT = 100.0
@@ -54,21 +54,21 @@ _FEWEST_ROWS = 4
 _FEWEST_STILL = 3
 _WHOLE = slice(None)
 _VECTORS = {"": _WHOLE, "γ": slice(3, None), "Ω": slice(0, 3)}
-"""Parts of a state that may stand still."""
+"""Parts of a state that may be frozen."""
 _ALONE = 1000.0
-"""States are alone in being off if they are off by so many times as much as any other, ..."""
+"""A few states are outliers if their error is so many times that of any other, ..."""
 _RIGHT = 1e-2
-"""... which is off by no more than that, ..."""
+"""... which is no more than that, ..."""
 _FEW_OF, _MOST_ALONE = 4, 8
-"""... and if they are at most one in four of all, and so many."""
+"""... and if they are at most one in four, and so many."""
 _GRID = 200
-"""Number of times at which the motion is looked at within one interval between samples."""
+"""Times at which the motion is evaluated within one interval between samples."""
 _BACK, _JUMPS = 0.05, 0.3
-"""A state that is so near to one of those is back at the start; one that is so far from where it should be jumps."""
+"""Distance within which a state is back near the start, and beyond which it jumps."""
 _AGAIN, _FOLLOWED = 10.0, 6
-"""The error of so many samples must fall by so much where a motion is said to start again."""
+"""Factor by which the error of so many samples must fall for a motion that starts again."""
 _LONG = 1.5
-"""The last interval between times does not measure a state if it is so many times the longest other."""
+"""The last state is not judged if the interval before it is so many times the longest other."""
 
 
 def diagnose(
@@ -81,7 +81,7 @@ def diagnose(
     relative_error: float | None,
     errors: Sequence[float] = (),
     frame: FileAxes | None = None,
-    seen: Seen | None = None,
+    seen: Observations | None = None,
     step: Fraction | None = None,
 ) -> list[Diagnosis]:
     """The explanation of the states of a motion: one mistake, or the digits they are written with; empty without any.
@@ -107,9 +107,9 @@ def diagnose(
             if seen is None and system in WITH_ATTITUDE:
                 seen = of_states(top, start, times, states)
             samples = samples if samples is not None and samples.rows else None
-            searches: list[Search] = [] if samples is None else [OfStates(samples)]
+            searches: list[Search] = [] if samples is None else [StateSearch(samples)]
             if seen is not None:
-                searches.insert(0 if frame else len(searches), Suppositions(seen, step))
+                searches.insert(0 if frame else len(searches), ConventionSearch(seen, step))
             mistake = _explanation(searches, samples)
     return [mistake] if mistake else []
 
@@ -126,7 +126,7 @@ def _explanation(searches: Sequence[Search], examined: Examined | None) -> Diagn
         exact = _looked_at(every, _lost_row(every))
     exact = exact or sure(FIRST[0]) or sure(FIRST[1])
     for columns in searches:
-        if isinstance(columns, Suppositions):
+        if isinstance(columns, ConventionSearch):
             exact = exact or columns.of_rates() or columns.of_start()
     if exact is not None:
         return exact
@@ -138,10 +138,10 @@ def _explanation(searches: Sequence[Search], examined: Examined | None) -> Diagn
 
 
 def _only_rounded(written: Rounding, error: float | None, examined: Examined | None) -> bool:
-    """Whether every component that is looked at is the true one, rounded as it is written."""
+    """Whether every component compared is the true one, rounded as it is written."""
     if error is not None and error > EXPLAINS * written.error:
         return False
-    truth = None if examined is None or not examined.rows else examined.supposed(examined.times)
+    truth = None if examined is None or not examined.rows else examined.simulated(examined.times)
     if examined is None or truth is None:
         return error is not None
     units, sizes = (numpy.repeat([value, 1.0], 3) for value in (float(examined.units.time), examined.rate))
@@ -149,17 +149,17 @@ def _only_rounded(written: Rounding, error: float | None, examined: Examined | N
     return bool((numpy.abs(examined.states - truth) <= allowed).all())
 
 
-class OfStates(Search):
-    """Hypotheses about the motion, its data and its equations."""
+class StateSearch(Search):
+    """The search among hypotheses about the states, the data and the equations."""
 
     def __init__(self, examined: Examined) -> None:
-        self.truth = examined.supposed(examined.times)
+        self.truth = examined.simulated(examined.times)
         self.own = examined.errors(self.truth)
         self.examined = examined.refusing(float(self.own.max()))
         self.times, self.states = examined.given_times, len(examined.all_times)
 
     def hypotheses(self) -> Iterator[Hypothesis]:
-        """The simplest first, those with a fitted number last."""
+        """All hypotheses, the simplest first, those with a fitted number last."""
         examined, truth = self.examined, self.truth
         single, several = ([], []) if truth is None else hypotheses.readings(examined, truth)
         yield from single
@@ -194,9 +194,9 @@ def _reset(examined: Examined | None) -> Diagnosis | None:
     every = examined.at(range(min(len(examined.all_times), MOST_AT_ONCE)))
     times = numpy.array([float(time) for time in every.times])
     grid = numpy.linspace(0, numpy.diff(times).max() if times[0] >= 0 else numpy.diff(times).min(), _GRID)
-    truth = every.supposed(every.times)
+    truth = every.simulated(every.times)
     own = None if truth is None else every.errors(truth)
-    orbit = every.supposed([Fraction(value) for value in grid]) if own is not None and own.max() > _JUMPS else None
+    orbit = every.simulated([Fraction(value) for value in grid]) if own is not None and own.max() > _JUMPS else None
     if orbit is None or own is None:
         return None
     sizes = numpy.repeat([every.rate, 1.0], [3, orbit.shape[1] - 3])
@@ -208,7 +208,7 @@ def _reset(examined: Examined | None) -> Diagnosis | None:
         nearest = int(numpy.abs((orbit - every.states[row]) / sizes).max(axis=1).argmin())
         expected = every.follows(row - 1)
         again = every.at([every.rows[n] for n in rows])
-        moved = again.supposed([time - every.times[row] + Fraction(grid[nearest]) for time in again.times])
+        moved = again.simulated([time - every.times[row] + Fraction(grid[nearest]) for time in again.times])
         jumps = expected is not None and _apart(every, every.states[row], expected) > _JUMPS
         left, error = float(again.errors(moved).max()), float(own[rows].max())
         if jumps and left * _AGAIN <= error:
@@ -219,7 +219,7 @@ def _reset(examined: Examined | None) -> Diagnosis | None:
 def _still(
     examined: Examined | None, states: Sequence[Sequence[Fraction | None]], relative_error: float | None
 ) -> Diagnosis | None:
-    """From some time on every state, or Ω or γ of it, is the same, in three at least, though the motion moves there."""
+    """At least three last states, or their Ω or γ, that are equal although the motion changes there."""
     if examined is None or (relative_error is not None and relative_error <= _WRONG):
         return None
     for name, part in _VECTORS.items():
@@ -238,7 +238,7 @@ def _still(
 
 def _moves(examined: Examined, row: int, part: slice) -> bool:
     """Whether the motion from the start, or that from the state of ``row``, moves from there to the next sample."""
-    true, here = examined.supposed(examined.all_times[row : row + 2]), examined.all_states[row]
+    true, here = examined.simulated(examined.all_times[row : row + 2]), examined.all_states[row]
     pairs = [(here, examined.follows(row))] + ([] if true is None else [(true[0], true[1])])
     return any(after is not None and _apart(examined, after, before, part) > _WRONG for before, after in pairs)
 
@@ -249,12 +249,12 @@ def _apart(examined: Examined, one: Array, other: Array, part: slice = _WHOLE) -
 
 
 def _off_alone(examined: Examined | None, times: Sequence[Fraction], errors: Array) -> Diagnosis | None:
-    """A few states that are off while all others are right.
+    """A few outliers among states that are right.
 
-    errors: as far as they were measured; where there are none, those of what heyoka reaches.
+    errors: as far as they were measured; where there are none, those relative to heyoka's motion.
     """
     every = examined.widened() if examined is not None and not len(errors) else None
-    truth = None if every is None or not every.rows else every.supposed(every.times)
+    truth = None if every is None or not every.rows else every.simulated(every.times)
     if every is not None and truth is not None:
         errors = every.errors(truth)
     order = numpy.argsort(-errors, kind="stable")
@@ -273,7 +273,7 @@ def _off_alone(examined: Examined | None, times: Sequence[Fraction], errors: Arr
 
 
 def _gap(error: float, other: float) -> bool:
-    """Whether an error is that of a state that is off, and the other that of one that is right."""
+    """Whether the first error is that of an outlier, and the other that of a right state."""
     return bool(error > WORTH_ASKING and error >= _ALONE * other and other <= _RIGHT)
 
 
@@ -289,7 +289,7 @@ def _jumps(examined: Examined | None, times: Sequence[Fraction], last: int, erro
 
 
 def _looked_at(examined: Examined, diagnosis: Diagnosis | None) -> Diagnosis | None:
-    """The diagnosis with how many of the states it was found in, where that is not all of them."""
+    """The diagnosis with the number of states that were compared, where that is not all of them."""
     if diagnosis is None:
         return None
     return replace(diagnosis, looked_at=scope(examined.given_times, len(examined.all_times)))
@@ -301,8 +301,8 @@ def _lost_row(every: Examined) -> Diagnosis | None:
     if len(times) < _FEWEST_ROWS:
         return None
     ends = {"row_missing": [*times[1:], 2 * times[-1] - times[-2]], "row_twice": [Fraction(0), *times[:-1]]}
-    readings = [(kind, every.supposed(moved)) for kind, moved in ends.items()]
-    truth = every.supposed(times)
+    readings = [(kind, every.simulated(moved)) for kind, moved in ends.items()]
+    truth = every.simulated(times)
     if truth is None:
         return None
     own = every.errors(truth)
@@ -323,7 +323,7 @@ def _integrals_off(examined: Examined) -> Diagnosis | None:
     """First integrals that keep a value from the first sample on which is not that of the start, and what others do."""
     if len(examined.rows) < 3 or not examined.is_whole:
         return None
-    truth = examined.supposed(examined.times)
+    truth = examined.simulated(examined.times)
     error = _TOO_FAR if truth is None else float(examined.errors(truth).max())
     if error <= WORTH_ASKING:
         return None
@@ -349,7 +349,7 @@ def _integrals_off(examined: Examined) -> Diagnosis | None:
 
 
 def _sizes(examined: Examined) -> dict[str, tuple[float, Fraction]]:
-    """Sizes of the integrals that are looked at, and their units."""
+    """Sizes and units of the integrals."""
     p = examined.system.parameters(examined.top, examined.start)
     inertia, moment = max(map(float, p.inertia)), max(abs(float(value)) for value in p.moment)
     rotor = max(abs(float(value)) for value in examined.top.rotor or (0,))

@@ -1,7 +1,6 @@
-"""A top or a start other than the ones that were given: the sign of γ or P, axes of the top renamed, another P, another
-start, another top.
+"""Hypotheses about states: other readings of their columns, another top or start, other times, other equations.
 
-Numbers are fitted to the first integrals, which are linear in them: with M = IΩ and n = P r, neither M·γ nor
+Numbers of the top are fitted to the first integrals, which are linear in them: with M = IΩ and n = P r, neither M·γ nor
 ½ Ω·M + n·γ may change from the start to any sample.
 """
 
@@ -26,8 +25,8 @@ from heavytop.features.score.diagnose.samples import (
     Examined,
     floats,
     in_units,
-    named,
     notable,
+    plain_number,
 )
 from heavytop.features.score.diagnose.search import ALIKE, FITTED_DROP, FLOOR, Array, Hypothesis
 from heavytop.precision import cross, decimal_text
@@ -35,18 +34,18 @@ from heavytop.top.attitude import rotated, transposed
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, NAMES, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 
-# Columns that mean something else than Ω and γ in body axes: axes renamed or reversed, γ down, M in place of Ω.
+# Other readings of the columns: axes renamed or reversed, γ down, M in place of Ω.
 
 
 _DEGREES = 180 / numpy.pi
 _TURNS = 1 / (2 * numpy.pi)
 _RPM = 60 * _TURNS
 UNITS_OF_OMEGA = {"degrees": _DEGREES, "turns": _TURNS, "rpm": _RPM}
-"""Of angular velocity, each as a multiple of radians per time unit; rpm where times are in seconds."""
+"""Units of angular velocity as multiples of radians per time unit; rpm where times are in seconds."""
 _FEWEST = 3
-"""Numbers of which one factor may be told."""
+"""Fewest numbers to which a factor is fitted."""
 _PRESENT = 1e-6
-"""A column of the true states counts as 0 below this part of its vector."""
+"""A column of the true states below this part of its vector counts as 0."""
 _MEANINGS: dict[str, tuple[float, float, bool]] = {
     "": (1, 1, False),
     "gamma_down": (1, -1, False),
@@ -62,9 +61,9 @@ _MEANINGS: dict[str, tuple[float, float, bool]] = {
 
 
 def _readings() -> Iterator[tuple[int, str, dict[str, str], list[int], list[float]]]:
-    """Every reading of the columns but the plain one: how many things are other than they should be, kind and numbers.
+    """Every reading of the columns but the plain one: the number of its changes, kind and numbers.
 
-    Then for each column its place in Ω, γ and M of a motion, one after the other, and its factor.  Of renamed axes
+    Then for each column its index among Ω, γ and M of a motion, and its factor.  Of renamed axes
     column i of a vector holds ±(axis |axes[i]|), counted from 1, ``of`` both vectors or of one.
     """
     plain, renamed = (1, 2, 3), list(permutations((1, 2, 3)))
@@ -97,7 +96,7 @@ _LARGEST_UNIT = Fraction(10) ** 300
 
 @cache
 def _every_reading() -> tuple[tuple[Any, ...], ...]:
-    """Changes, kinds, numbers, places and factors of every reading, the simplest first."""
+    """Changes, kinds, numbers, indices and factors of every reading, the simplest first."""
     return tuple(zip(*sorted(_readings(), key=lambda reading: reading[0]), strict=True))
 
 
@@ -131,7 +130,7 @@ def scaled(run: Examined, truth: Array) -> Iterator[Hypothesis]:
         if not numpy.isfinite(fitted) or not fitted:
             continue
         left = float(_divided(run, truth, columns, fitted).max())
-        factor = named(fitted, ALIKE * max(left, FLOOR) * abs(fitted))
+        factor = plain_number(fitted, ALIKE * max(left, FLOOR) * abs(fitted))
         if factor and (factor != -1 or true.shape[1] == 1) and notable(factor, Fraction(1)):
             numbers = {"column": NAMES[columns.start]} if kind == "column_scaled" else {}
             numbers["factor"] = decimal_text(factor, 8)
@@ -145,7 +144,7 @@ def _divided(run: Examined, truth: Array, columns: slice, factor: float) -> Arra
 
 
 def constant_column(run: Examined, truth: Array) -> Iterator[Hypothesis]:
-    """A column that is the same in every state, and the error of the other five."""
+    """A column that is constant, with the error of the other five."""
     if len(run.rows) < _FEWEST:
         return
     still = (run.all_states == run.all_states[0]).all(axis=0)
@@ -158,23 +157,23 @@ def constant_column(run: Examined, truth: Array) -> Iterator[Hypothesis]:
 
 
 _SINGULAR = 1e-4
-"""The integrals name one top if the smallest singular value is smaller than this part of the next."""
+"""The integrals determine one top if the smallest singular value is below this part of the next."""
 _NEAR = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10)
-"""Widths, relative to the data, within which a fitted number may be rounded; the first that does no harm is taken."""
+"""Relative widths within which a fitted number may be rounded; the first that keeps the error small is taken."""
 _MOST_CHANGED = 3
 _MARGIN = 30.0
-"""How many errors of the samples a fitted number may be off."""
+"""Factor of the errors of the samples by which a fitted number may be off."""
 _BIAS = 0.02
-"""A number of the start that is off by less, relative to its vector, may be a method's own unless it is round."""
+"""A smaller change of the start, relative to its vector, may be the error of a method unless the number is round."""
 _SPARSE = 0.05
-"""Of the distance between short decimals, within which agreement is not accidental."""
+"""Part of the distance between short decimals within which agreement is not accidental."""
 _AT_ONCE = 1e-3
 _LATER = 2
-"""The last sample must be so many times as late as the first to distinguish a start from the method's own errors."""
+"""The last sample must be so many times as late as the first to distinguish a start from the errors of a method."""
 
 
 def without_numbers(run: Examined) -> Iterator[Hypothesis]:
-    """Mistakes of the data that need no fitted number, the likeliest first."""
+    """Mistakes of the data without a fitted number, the likeliest first."""
     top, (omega, gamma) = run.top, (run.start.omega, run.start.gamma)
     k = top.rotor or (Fraction(0),) * 3
     inertia_unit = run.units.inertia
@@ -188,7 +187,7 @@ def without_numbers(run: Examined) -> Iterator[Hypothesis]:
     ):
         supposed = replace(run, **other)
         if (supposed.top.moment, supposed.start) != (top.moment, run.start):
-            yield Hypothesis(kind, {}, supposed.beside())
+            yield Hypothesis(kind, {}, supposed.motion_errors())
     if inertia_unit <= _LARGEST_UNIT:
         momenta = _restated(run, momentum, lambda omega: float(inertia_unit) * (omega @ run.tensor + run.in_file(k)))
         yield Hypothesis("all_momentum", {}, momenta)
@@ -196,15 +195,15 @@ def without_numbers(run: Examined) -> Iterator[Hypothesis]:
         yield Hypothesis(f"all_in_{unit}", {}, _all_times(run, factor))
     without = top if top.rotor is None else replace(top, rotor=None)
     other_system = GYROSTAT if run.system is HEAVY_TOP else HEAVY_TOP
-    yield Hypothesis("system", {}, replace(run, system=other_system, top=without).beside())
+    yield Hypothesis("system", {}, replace(run, system=other_system, top=without).motion_errors())
     if any(k):
         turned = HeavyTop(top.inertia, top.weight, top.centre, [-part for part in k])
-        yield Hypothesis("rotor_sign", {}, replace(run, top=turned).beside())
+        yield Hypothesis("rotor_sign", {}, replace(run, top=turned).motion_errors())
     own = run.tensor, run.in_file(top.centre), run.in_file(k)
     for kind, numbers, *body in other_axes(*own):
         if not all(map(numpy.array_equal, body, own)):
             supposed = run.with_body(body[0], float(top.weight) * body[1], body[2])
-            yield Hypothesis(kind, numbers, supposed.beside())
+            yield Hypothesis(kind, numbers, supposed.motion_errors())
 
 
 def other_axes(tensor: Array, centre: Array, rotor: Array) -> Iterator[tuple[str, dict[str, str], Array, Array, Array]]:
@@ -216,13 +215,13 @@ def other_axes(tensor: Array, centre: Array, rotor: Array) -> Iterator[tuple[str
         yield "centre_axes", numbers, tensor, centre[places], rotor
         yield "top_axes", numbers, turned, centre[places], rotor[places]
     for signs in list(product((1, -1), repeat=3))[1:-1]:
-        texts = (_text(named(value, 1e-15 * abs(value))) for value in centre * signs)
+        texts = (_text(plain_number(value, 1e-15 * abs(value))) for value in centre * signs)
         yield "centre_signs", {"centre": ", ".join(texts)}, tensor, centre * signs, rotor
 
 
 def _restated(run: Examined, start: State, omega: Callable[[Array], Array]) -> Array:
-    """The error where the start is another, and the states give something else in place of Ω."""
-    truth = replace(run, start=start).supposed(run.times)
+    """The error with another start, and states that give another quantity in place of Ω."""
+    truth = replace(run, start=start).simulated(run.times)
     return run.errors(None if truth is None else numpy.hstack([omega(truth[:, :3]), truth[:, 3:]]))
 
 
@@ -239,14 +238,14 @@ def all_scaled(run: Examined) -> Iterator[Hypothesis]:
         return
     fitted = square**0.5
     left = float(_all_times(run, fitted).max())
-    factor = named(fitted, _MARGIN * max(left, FLOOR) * fitted)
+    factor = plain_number(fitted, _MARGIN * max(left, FLOOR) * fitted)
     if factor and notable(factor, Fraction(1)):
         numbers = {"factor": decimal_text(factor, 8)}
         yield Hypothesis("all_scaled", numbers, _all_times(run, float(factor)), FITTED_DROP)
 
 
 def _weight_ratio(run: Examined) -> float | None:
-    """P over the given one, from the energy: ½ Ω·M may change only by what P r·γ loses.  None where neither moves."""
+    """P over the given one, from the energy: ½ Ω·M changes by what P r·γ loses.  None where neither changes."""
     if not run.is_whole:
         return None
     tensor, start = run.tensor, run.in_file(run.start.flat)
@@ -259,13 +258,13 @@ def _weight_ratio(run: Examined) -> float | None:
 
 
 def another_weight(run: Examined) -> Iterator[Hypothesis]:
-    """P from the energy."""
+    """Another P, from the energy."""
     ratio, old = _weight_ratio(run), run.top.weight
     if ratio is None or not isfinite(ratio * float(old)):
         return
-    weights = [named(ratio * float(old), near * abs(float(old))) for near in _NEAR]
+    weights = [plain_number(ratio * float(old), near * abs(float(old))) for near in _NEAR]
     tops = [(other, replace(run.top, weight=other)) for other in weights]
-    weight, errors = _roundest([(other, replace(run, top=top).beside()) for other, top in tops])
+    weight, errors = _roundest([(other, replace(run, top=top).motion_errors()) for other, top in tops])
     if notable(weight, old):
         yield Hypothesis("weight", {"P": _text(weight * run.units.moment)}, errors, FITTED_DROP)
 
@@ -273,29 +272,29 @@ def another_weight(run: Examined) -> Iterator[Hypothesis]:
 def another_start(run: Examined) -> Iterator[Hypothesis]:
     """The start from the first sample, carried back to t = 0, and checked on samples that are much later.
 
-    The error must fall by more than the motion itself magnifies it from the start to the first sample: where
-    neighbouring motions part quickly, the errors of a method look like those of a start.
+    The error must fall by more than the motion amplifies it from the start to the first sample: where neighbouring
+    motions diverge quickly, the errors of a method look like those of a start.
     """
     times = run.times
     if len(times) < 3 or not times[0] or abs(times[-1]) < _LATER * abs(times[0]) or numpy.isnan(run.states[0]).any():
         return
-    back = run.starting(run.states[0]).supposed([-times[0]])
-    truth = run.supposed(times[:1])
+    back = run.starting(run.states[0]).simulated([-times[0]])
+    truth = run.simulated(times[:1])
     if back is None or truth is None:
         return
     # a motion that magnifies the errors of a method may look like one from another start
-    early, late = run.at(run.rows[:1]).errors(truth), run.errors(run.supposed(times))
+    early, late = run.at(run.rows[:1]).errors(truth), run.errors(run.simulated(times))
     if early.max() < _AT_ONCE * late.max():
         return
     start = run.in_file(run.start.flat)
-    errors = run.starting(back[0]).beside()
+    errors = run.starting(back[0]).motion_errors()
     off = numpy.abs(back[0, :6] - start)
     magnified = float(numpy.abs(run.states[0] - truth[0]).max() / (off.max() or 1.0))
     sizes = [max(run.rate, numpy.abs(back[0, :3]).max())] * 3 + [1.0] * 3
     units = [run.units.time] * 3 + [Fraction(1)] * 3
     noise = _MARGIN * max(float(errors.max()), 1e-12)
     changed = [
-        (name, named(float(value), noise * size), unit, change > _BIAS * size, noise * size)
+        (name, plain_number(float(value), noise * size), unit, change > _BIAS * size, noise * size)
         for name, value, change, size, unit in zip(NAMES, back[0], off, sizes, units, strict=False)
         if change > noise * size
     ]
@@ -338,7 +337,7 @@ def _is_full(run: Examined) -> bool:
 
 
 def _conserving(run: Examined, entries: Sequence[tuple[int, int]]) -> Array | None:
-    """The one direction of (I, n) along which M·γ and the energy keep their values; None where there is not one."""
+    """The only direction of (I, n) in which M·γ and the energy are constant; None unless there is exactly one."""
     if not run.is_whole:
         return None
     start = run.in_file(run.start.flat)
@@ -364,14 +363,14 @@ def _conserving(run: Examined, entries: Sequence[tuple[int, int]]) -> Array | No
 
 
 def _scaled(direction: Array, before: Sequence[Fraction], near: float) -> list[Fraction]:
-    """The direction with the factor by which most numbers stay what they are, within ``near`` of the largest."""
+    """The direction with the factor that leaves most numbers unchanged, within ``near`` of the largest."""
     old = floats(before)
     largest = [numpy.abs(old[:-3]).max(), numpy.abs(old[-3:]).max() or numpy.abs(old[:-3]).max()]
     sizes = numpy.repeat(largest, [len(old) - 3, 3])
     factors = [o / d for o, d in zip(old, direction, strict=True) if o and d]
     scaled = max((direction * f for f in factors), key=lambda new: int((numpy.abs(new - old) <= near * sizes).sum()))
     return [
-        o if abs(value - float(o)) <= near * size else named(float(value), near * size)
+        o if abs(value - float(o)) <= near * size else plain_number(float(value), near * size)
         for value, o, size in zip(scaled, before, sizes, strict=True)
     ]
 
@@ -382,7 +381,7 @@ def _with(run: Examined, inertia: Sequence[Fraction], moment: Sequence[Fraction]
     for (i, j), value in zip(_PRODUCTS, floats(inertia), strict=False):
         tensor[i, j] = tensor[j, i] = value
     try:
-        return run.with_body(tensor, floats(moment)).beside()
+        return run.with_body(tensor, floats(moment)).motion_errors()
     except InputError:  # a moment that is not positive
         return run.errors(None)
 
@@ -391,7 +390,7 @@ _Numbers = TypeVar("_Numbers")
 
 
 def _roundest(tried: Sequence[tuple[_Numbers, Array]]) -> tuple[_Numbers, Array]:
-    """The first, that is the most rounded, whose error is about as small as any."""
+    """The first, most rounded of these whose error is about the smallest."""
     best = min(errors.max() for _, errors in tried)
     return next(pair for pair in tried if pair[1].max() <= ALIKE * best)
 
@@ -404,7 +403,7 @@ def _text(value: Fraction) -> str:
     return str(value)
 
 
-# States of other equations, in other axes or in another order of columns than can be read off a heavy top's.
+# States of other equations, in axes of space, or with columns in any order.
 #
 # These are tried after everything simpler.
 
@@ -504,7 +503,7 @@ def _of_field(
     rotor = floats(run.top.rotor or (Fraction(0),) * 3)
     values = numpy.concatenate([rotor, run.frame.axes.reshape(-1), weights.reshape(-1)]).tolist()
     system = _Weighted("weighted_heavy_gyrostat", _weighted, HEAVY_TOP.angular_velocity, numbers=tuple(values))
-    return Hypothesis(kind, numbers, replace(run, system=system).beside(), FITTED_DROP)
+    return Hypothesis(kind, numbers, replace(run, system=system).motion_errors(), FITTED_DROP)
 
 
 def of_equations(run: Examined, truth: Array) -> Iterator[Hypothesis]:
@@ -537,7 +536,7 @@ def _axes_of_space(run: Examined, truth: Array) -> Iterator[Hypothesis]:
 
 
 def _any_order(run: Examined, truth: Array) -> Iterator[Hypothesis]:
-    """Each column as that component, or its negative, that it is nearest to."""
+    """Each column as the component, or its negative, to which it is nearest."""
     unit = float(run.units.time)
     of_file = numpy.repeat([unit, 1.0], 3)
     truth, states = truth[:, :6] / of_file, run.states[:, :6] / of_file
@@ -550,24 +549,24 @@ def _any_order(run: Examined, truth: Array) -> Iterator[Hypothesis]:
         yield Hypothesis("column_order", {"columns": names}, off[:, range(6), nearest].max(axis=1), FITTED_DROP)
 
 
-# Times that mean something else: reversed, shifted, in another unit, or off by a row.
+# Other times: reversed, shifted, in another unit, or off by a row.
 
 
 _GRID = 1500
 _WITHIN = 0.3
-"""A place of the grid is tried if the first state is so near to it, relative to the size of the motion."""
+"""A time of the grid is tried if the first state is so near to the motion there, relative to its size."""
 _TRIED = 12
 _REFINED = 6
 _FALLS = 1.5
 """Factor by which the sum of squares falls while a number is refined."""
 _SPAN = Fraction(1, 10)
-"""The samples must spread over so much of their time: an integrator's own lag grows with time and is not a shift."""
+"""The samples must spread over this part of their time: the lag of an integrator grows with time and is not a shift."""
 _NEAR_ONE = 0.05
-"""A clock that is off by less may be an integrator's own lag, unless the factor is a short decimal."""
+"""A smaller error of a clock may be the lag of an integrator, unless the factor is a short decimal."""
 _SHORT = 3
 _EXACTLY = 1e-9
 _MOST_STEPS = 300
-"""In an interval between samples, of which one too many or too few is recognised: further ones are too near to 1."""
+"""Most steps of an interval between samples of which one too many or too few is recognised."""
 _UNITS = {Fraction(n, d) for n, d in ((1000, 1), (60, 1), (3600, 1), (1, 1000), (1, 60), (1, 3600))}
 _FEWEST_ROWS = 3
 _CIRCLE = (2 * numpy.pi, 1 / (2 * numpy.pi), numpy.pi / 180, 180 / numpy.pi)
@@ -581,7 +580,7 @@ def clock(run: Examined) -> Iterator[Hypothesis]:
     yield from _of_rows(run)
     for factor in sorted(_UNITS | {Fraction(value) for value in _CIRCLE}):
         if abs(float(factor * run.times[-1])) * run.rate <= FARTHEST:
-            errors = run.beside([factor * time for time in run.times])
+            errors = run.motion_errors([factor * time for time in run.times])
             yield Hypothesis("time_unit", _unit_numbers(float(factor)), errors)
 
 
@@ -591,28 +590,28 @@ def _unit_numbers(factor: float) -> dict[str, str]:
 
 
 def _of_rows(run: Examined) -> Iterator[Hypothesis]:
-    """Rows that are those of other times."""
+    """Rows that belong to other times."""
     every = run.all_times
-    yield Hypothesis("time_reversed", {}, run.beside([-time for time in run.times]))
+    yield Hypothesis("time_reversed", {}, run.motion_errors([-time for time in run.times]))
     if len(every) == 1:
         return
     late = [every[row - 1] if row else Fraction(0) for row in run.rows]
-    yield Hypothesis("start_row_missing", {}, run.beside(late))
-    yield Hypothesis("rows_reversed", {}, run.beside([every[-1 - row] for row in run.rows]))
+    yield Hypothesis("start_row_missing", {}, run.motion_errors(late))
+    yield Hypothesis("rows_reversed", {}, run.motion_errors([every[-1 - row] for row in run.rows]))
     yield from _neighbours(run, "rows_off_by_one", (*every[1:], 2 * every[-1] - every[-2]))
     yield from _neighbours(run, "rows_late", (2 * every[0] - every[1], *every[:-1]))
 
 
 def _neighbours(run: Examined, kind: str, times: Sequence[Fraction]) -> Iterator[Hypothesis]:
-    """The states of other ``times``; also without the row at an end that has a time of no sample, where enough are left
-    that are about as wrong as all.
+    """The states of other ``times``; also without the row at an end whose time is no sample's, where enough rows remain
+    and their error is about that of all.
     """
-    yield Hypothesis(kind, {}, run.beside([times[row] for row in run.rows]))
+    yield Hypothesis(kind, {}, run.motion_errors([times[row] for row in run.rows]))
     fewer = run.at([row for row in run.rows if times[row] in run.all_times])
     if _FEWEST_ROWS <= len(fewer.rows) < len(run.rows):
-        wrong, wrong_of_all = (samples.errors(samples.supposed(samples.times)).max() for samples in (fewer, run))
+        wrong, wrong_of_all = (samples.errors(samples.simulated(samples.times)).max() for samples in (fewer, run))
         if ALIKE * wrong >= wrong_of_all:
-            yield Hypothesis(kind, {}, fewer.beside([times[row] for row in fewer.rows]))
+            yield Hypothesis(kind, {}, fewer.motion_errors([times[row] for row in fewer.rows]))
 
 
 def fitted_clock(run: Examined) -> Iterator[Hypothesis]:
@@ -622,7 +621,7 @@ def fitted_clock(run: Examined) -> Iterator[Hypothesis]:
         return
     reach = min(1.5 * abs(times[-1]) + 6 / run.rate, FARTHEST / run.rate)
     grid = numpy.linspace(-reach, reach, _GRID)
-    orbit = run.supposed([Fraction(value) for value in grid])
+    orbit = run.simulated([Fraction(value) for value in grid])
     if orbit is None:
         return
     sizes = numpy.array([max(orbit[:, :3].max(), -orbit[:, :3].min()) or 1.0] * 3 + [1.0] * (orbit.shape[1] - 3))
@@ -657,7 +656,7 @@ def _steps_of_interval(factor: float) -> int | None:
 
 
 def _is_short(factor: float) -> bool:
-    """Whether the factor, or one over it, is of three digits or off 1 by a step, as no integrator's lag is."""
+    """Whether the factor, or its inverse, has three digits or is off 1 by a step, as no lag of an integrator is."""
     if _steps_of_interval(factor) is not None:
         return True
     near = [Fraction(decimal_text(Fraction(value), _SHORT)) for value in (factor, 1 / factor)]
@@ -668,7 +667,7 @@ def _is_short(factor: float) -> bool:
 
 
 def _near(orbit: Array, state: Array) -> list[int]:
-    """Places of the grid where the orbit comes nearest to a state, the nearest first."""
+    """Indices of the grid where the orbit comes nearest to a state, the nearest first."""
     far = numpy.fmax.reduce(numpy.abs(orbit - state), axis=1)
     lower = (far <= numpy.roll(far, 1)) & (far <= numpy.roll(far, -1)) & (far < _WITHIN)
     places = numpy.flatnonzero(lower)
@@ -680,23 +679,23 @@ def _moved(kind: str, number: float, times: Array) -> Array:
 
 
 def _refined(run: Examined, kind: str, number: float, times: Array, sizes: Array) -> Iterator[tuple[float, Array]]:
-    """The number that fits best, with the errors that it leaves; none where the motion is not known there."""
+    """The number that fits best, with the errors that remain; none where the motion is not known there."""
 
     def off(x: Array) -> Array:
         at = _moved(kind, x[0], times)
-        known = run.supposed([*map(Fraction, at)]) if numpy.isfinite(at).all() else None
+        known = run.simulated([*map(Fraction, at)]) if numpy.isfinite(at).all() else None
         return numpy.full(1, numpy.inf) if known is None else numpy.nan_to_num((known - run.states) / sizes).reshape(-1)
 
     small = 1e-6 / run.rate / (1.0 if kind == "times_shifted" else abs(times).max())
     x, here = gauss_newton(off, numpy.array([number]), small, _REFINED)
     if numpy.isfinite(here).all():
-        yield float(x[0]), run.beside([Fraction(value) for value in _moved(kind, x[0], times)])
+        yield float(x[0]), run.motion_errors([Fraction(value) for value in _moved(kind, x[0], times)])
 
 
 def gauss_newton(off: Callable[[Array], Array], x: Array, slight: float, most: int) -> tuple[Array, Array]:
-    """Numbers and residuals ``off``, as far as each of so many steps makes their sum of squares smaller.
+    """Numbers and residuals ``off`` after at most so many Gauss-Newton steps, each of which reduces the sum of squares.
 
-    slight: of a number, in a difference quotient.
+    slight: the step of a difference quotient.
     """
     here = off(x)
     for _ in range(most):
@@ -709,5 +708,5 @@ def gauss_newton(off: Callable[[Array], Array], x: Array, slight: float, most: i
             break
         falls, x, here = float(here @ here) > _FALLS * float(there @ there), after, there
         if not falls:
-            break  # at the least of it
+            break  # at the minimum
     return x, here

@@ -1,4 +1,4 @@
-"""Meanings of the columns of a file with attitudes: one reading of its conventions, and its error beside a motion."""
+"""Readings of the columns of a file with attitudes, and their errors relative to a simulated motion."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from heavytop.top.bodies import CENTRE, Body
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 
-# Motions of a body in double, quickly and many times over, for suppositions about the conventions of a file.
+# Motions of a body in double, for hypotheses about the conventions of a file.
 #
 # Numbers are numpy arrays in the units of the file; a motion is computed in units in which its rates are about 1.
 
 
 _WIDEST = 1.0
-"""Radians between neighbouring samples, up to which the mean of Ω is the rate of the turn, roughly."""
+"""Radians between neighbouring samples up to which the mean of Ω approximates the rate of the rotation."""
 _LEAST = 1e-12
-"""A principal moment below this part of the largest is not that of a body."""
+"""Smallest ratio of two principal moments of a body."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,14 +54,14 @@ class BodyData:
 
     @cached_property
     def steiner(self) -> Array:
-        """The term that moving the tensor from the centre of mass to the fixed point adds to it."""
+        """Steiner's term: the tensor about the fixed point less that about the centre of mass."""
         c = self.centre
         tensor: Array = (self.mass or 0.0) * (float(c @ c) * numpy.eye(3) - numpy.outer(c, c))
         return tensor
 
     @cached_property
     def tensor(self) -> Array:
-        """About the fixed point."""
+        """The inertia tensor about the fixed point."""
         return self.inertia + self.steiner if self.about_centre else self.inertia
 
     @cached_property
@@ -71,15 +71,15 @@ class BodyData:
 
 
 @dataclass(frozen=True, eq=False)
-class Beginning:
-    """Where a motion begins: R in canonical axes of space, shape (3, 3), and Ω in body axes."""
+class InitialState:
+    """Start of a motion: R in canonical axes of space, shape (3, 3), and Ω in body axes."""
 
     rotation: Array
     omega: Array
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class SimulatedMotion:
     """A motion at some times: R in canonical axes of space, shape (n, 3, 3), and Ω in body axes, shape (n, 3)."""
 
     rotation: Array
@@ -100,7 +100,7 @@ def nearest_rotation(matrix: Array) -> Array:
 
 
 @lru_cache(maxsize=512)
-def simulate(body: BodyData, start: Beginning, times: tuple[float, ...]) -> Course | None:
+def simulate(body: BodyData, start: InitialState, times: tuple[float, ...]) -> SimulatedMotion | None:
     """The motion at ``times``; None for an invalid body, and where it cannot be computed."""
     tensor = body.tensor
     if not (numpy.isfinite(tensor).all() and numpy.isfinite(body.centre).all() and isfinite(body.force)):
@@ -121,7 +121,7 @@ def simulate(body: BodyData, start: Beginning, times: tuple[float, ...]) -> Cour
         return None
     gamma, along = values[:, 3:6], values[:, 6:9]
     rotation = numpy.stack([along, numpy.array(cross([*gamma.T], [*along.T])).T, gamma], axis=1) @ axes.T
-    return Course(rotation, values[:, :3] @ axes.T * rate)
+    return SimulatedMotion(rotation, values[:, :3] @ axes.T * rate)
 
 
 def _rate(moments: Array, moment: Array, omega: Array) -> float:
@@ -134,7 +134,7 @@ def _power(value: float) -> float:
     return 2.0 ** floor(log10(value) / log10(2)) if value > 0 and isfinite(value) else 1.0
 
 
-def turning(body: BodyData, start: Beginning) -> float:
+def turning(body: BodyData, start: InitialState) -> float:
     """Radians per time unit at which the motion turns, roughly."""
     moments = numpy.linalg.eigvalsh(body.tensor)
     return _rate(numpy.asarray(moments, dtype=numpy.float64), body.force * body.centre, start.omega) or 1.0
@@ -148,15 +148,15 @@ Square = tuple[tuple[float, ...], ...]
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """A meaning of the columns, or of the start.
+    """One reading of the columns, or of the start.
 
     scalar_last, conjugate: of quaternions.  transposed: of matrices.  sequence, extrinsic, negated, degrees: of angles.
-    up: the axis that points up.  swapped: Ω said to be in body axes is in space axes, and the other way round.
-    omega, gamma: factors that the columns have beside Ω and γ.  momentum: M stands in place of Ω.
+    up: the axis that points up.  swapped: Ω declared in body axes is in space axes, and conversely.
+    omega, gamma: factors of the columns of Ω and γ.  momentum: the columns of Ω are M.
     space, body: rotations Q, B so that the file's vectors are Q v and B v.  mirror: the axis, from 0, that is reversed;
-    pseudo: whether Ω is then turned over as well.
+    pseudo: whether Ω then transforms as an axial vector.
     scale: a factor of positions.  displaced: from the first position.  offset: added to every position, in canonical
-    axes of space.  point: whose positions they are; None for the one that was said.
+    axes of space.  point: whose positions they are; None for the declared one.
     """
 
     scalar_last: bool = False
@@ -220,7 +220,7 @@ class Reading:
         return upright(self._reflected(values, axial) @ numpy.array(self.space), self.up)
 
     def body_vectors(self, values: Array, axial: bool = False) -> Array:
-        """Vectors of the body in the axes said, shape (n, 3)."""
+        """Vectors of the body in its declared axes, shape (n, 3)."""
         vectors: Array = self._reflected(values, axial) @ numpy.array(self.body)
         return vectors
 
@@ -249,7 +249,7 @@ def upright(vectors: Array, up: str) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class GivenStart:
-    """The start as it was given.
+    """The start as the file declares it.
 
     form: of ``values``: quaternion, matrix, euler; "rows", R in canonical axes of space; or "plain", R in those of the
     file, whatever its matrices are.  omega: in body axes, or those of space where ``in_space``.
@@ -260,15 +260,15 @@ class GivenStart:
     omega: Array
     in_space: bool = False
 
-    def begin(self, reading: Reading, inertia: Array) -> Beginning:
-        """Where the motion begins if the start is to be read so."""
+    def begin(self, reading: Reading, inertia: Array) -> InitialState:
+        """The start of the motion in this reading."""
         begin = _as_read(self, reading)
         if not reading.momentum:
             return begin
-        return Beginning(begin.rotation, numpy.linalg.solve(inertia, begin.omega).astype(float))
+        return InitialState(begin.rotation, numpy.linalg.solve(inertia, begin.omega).astype(float))
 
-    def as_read(self, reading: Reading) -> Beginning:
-        """R and the columns of Ω in body axes, which may be M."""
+    def as_read(self, reading: Reading) -> InitialState:
+        """R, and Ω in body axes, or M where its columns are the momentum."""
         if self.form == "rows":
             rotation = self.values.reshape(3, 3)
             if reading.gamma < 0:
@@ -282,17 +282,17 @@ class GivenStart:
             omega = rotation.T @ reading.vectors(said, True)[0]
         else:
             omega = reading.body_vectors(said, True)[0]
-        return Beginning(rotation, omega)
+        return InitialState(rotation, omega)
 
 
 _as_read = lru_cache(maxsize=256)(GivenStart.as_read)
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
-    """The samples of a file that are looked at.
+class Observations:
+    """Samples of a file.
 
-    times: of one sign.  columns: by the name of the quantity, shape (n, width).  body, start, said: as the file says.
+    times: of one sign.  columns: by the name of the quantity, shape (n, width).  body, start, said: as declared.
     point, pivot: of positions.
     """
 
@@ -304,43 +304,45 @@ class Seen:
     point: Array
     pivot: Array
 
-    def at(self, rows: list[int]) -> Seen:
-        """This file at some of its samples."""
+    def at(self, rows: list[int]) -> Observations:
+        """The file at some of its samples."""
         times = tuple(self.times[row] for row in rows)
         return replace(self, times=times, columns={k: v[rows] for k, v in self.columns.items()})
 
 
-def errors(seen: Seen, course: Course | None, reading: Reading, body: BodyData) -> Array:
-    """The error of each sample, read so, relative to the size of each quantity; infinite without a motion."""
-    if course is None:
-        return numpy.full(len(seen.times), numpy.inf)
-    off = numpy.abs(residuals(seen, course, reading, body)).reshape(len(seen.times), -1).max(axis=1)
+def errors(samples: Observations, simulated: SimulatedMotion | None, reading: Reading, body: BodyData) -> Array:
+    """The error of each sample in this reading, relative to the size of each quantity; infinite without a motion."""
+    if simulated is None:
+        return numpy.full(len(samples.times), numpy.inf)
+    off = numpy.abs(residuals(samples, simulated, reading, body)).reshape(len(samples.times), -1).max(axis=1)
     largest: Array = numpy.nan_to_num(off, nan=numpy.inf, posinf=numpy.inf)
     return largest
 
 
-def residuals(seen: Seen, course: Course, reading: Reading, body: BodyData) -> Array:
-    """What the columns, read so, have more than the motion, relative to the size of each quantity, sample by sample."""
-    parts = [_residual(seen, course, reading, body, name, values) for name, values in seen.columns.items()]
+def residuals(samples: Observations, simulated: SimulatedMotion, reading: Reading, body: BodyData) -> Array:
+    """Columns in this reading less the motion, relative to the size of each quantity, sample by sample."""
+    parts = [_residual(samples, simulated, reading, body, name, values) for name, values in samples.columns.items()]
     return numpy.concatenate(parts, axis=1).reshape(-1)
 
 
-def _residual(seen: Seen, course: Course, reading: Reading, body: BodyData, name: str, values: Array) -> Array:
-    size, true = 1.0, course.rotation
+def _residual(
+    samples: Observations, simulated: SimulatedMotion, reading: Reading, body: BodyData, name: str, values: Array
+) -> Array:
+    size, true = 1.0, simulated.rotation
     if name == "position":
-        point = seen.point if reading.point is None else numpy.array(reading.point)
-        true = course.rotation @ point
+        point = samples.point if reading.point is None else numpy.array(reading.point)
+        true = simulated.rotation @ point
         if reading.displaced:
-            true = true - seen.start.begin(reading, numpy.eye(3)).rotation @ point
+            true = true - samples.start.begin(reading, numpy.eye(3)).rotation @ point
         size = float(numpy.linalg.norm(point)) or 1.0
-        read = (reading.vectors(values - seen.pivot) - numpy.array(reading.offset)) / reading.scale
+        read = (reading.vectors(values - samples.pivot) - numpy.array(reading.offset)) / reading.scale
     elif name == "gamma":
-        read, true = reading.body_vectors(values) / reading.gamma, course.rotation[:, 2]
+        read, true = reading.body_vectors(values) / reading.gamma, simulated.rotation[:, 2]
     elif name in ("omega", "omega_space"):
-        true = course.omega @ body.tensor if reading.momentum else course.omega
+        true = simulated.omega @ body.tensor if reading.momentum else simulated.omega
         in_space = (name == "omega_space") != reading.swapped
         if in_space:
-            true = numpy.einsum("nij,nj->ni", course.rotation, true)
+            true = numpy.einsum("nij,nj->ni", simulated.rotation, true)
         size = float(numpy.linalg.norm(true, axis=1).max()) or 1.0
         read = (reading.vectors if in_space else reading.body_vectors)(values, True) / reading.omega
     else:
@@ -349,24 +351,24 @@ def _residual(seen: Seen, course: Course, reading: Reading, body: BodyData, name
     return off
 
 
-def rates_off(seen: Seen, reading: Reading) -> Array | None:
+def rates_off(samples: Observations, reading: Reading) -> Array | None:
     """How far Ω is from the rate at which the attitude turns, between neighbouring samples and relative to Ω.
 
-    It needs no motion.  None where the file gives not both; infinite where the body turns too far in between.
+    No motion is computed.  None unless the file gives both; infinite where the body turns too far in between.
     """
-    form = next((form for form in ("quaternion", "matrix", "euler") if form in seen.columns), None)
-    name = next((name for name in ("omega", "omega_space") if name in seen.columns), None)
-    if form is None or name is None or len(seen.times) < 2:
+    form = next((form for form in ("quaternion", "matrix", "euler") if form in samples.columns), None)
+    name = next((name for name in ("omega", "omega_space") if name in samples.columns), None)
+    if form is None or name is None or len(samples.times) < 2:
         return None
-    rotation = reading.rotation(form, seen.columns[form])
+    rotation = reading.rotation(form, samples.columns[form])
     turn = rotation[:-1].transpose(0, 2, 1) @ rotation[1:]
     skew = numpy.stack([turn[:, k, j] - turn[:, j, k] for j, k in ((1, 2), (2, 0), (0, 1))], axis=1) / 2
     cosine = (numpy.trace(turn, axis1=1, axis2=2) - 1) / 2
     angle = numpy.arctan2(numpy.linalg.norm(skew, axis=1), cosine)
-    spans = numpy.diff(numpy.array([float(time) for time in seen.times]))
+    spans = numpy.diff(numpy.array([float(time) for time in samples.times]))
     rate = skew * (angle / numpy.maximum(numpy.sin(angle), 1e-300) / spans)[:, None]
     in_space = (name == "omega_space") != reading.swapped
-    omega = (reading.vectors if in_space else reading.body_vectors)(seen.columns[name], True) / reading.omega
+    omega = (reading.vectors if in_space else reading.body_vectors)(samples.columns[name], True) / reading.omega
     if in_space:
         omega = numpy.einsum("nji,nj->ni", rotation, omega)
     size = max(float(numpy.linalg.norm(rate, axis=1).max()), 1e-300)
@@ -374,9 +376,9 @@ def rates_off(seen: Seen, reading: Reading) -> Array | None:
     return numpy.where(angle < _WIDEST, off, numpy.inf)
 
 
-def disagreement(seen: Seen) -> dict[tuple[str, str], Array]:
-    """How far columns that say the same are apart in each sample, by their names; relative for Ω and positions."""
-    columns, said = seen.columns, seen.said
+def disagreement(samples: Observations) -> dict[tuple[str, str], Array]:
+    """Differences of columns of one quantity in each sample, by their names; relative for Ω."""
+    columns, said = samples.columns, samples.said
     forms = [form for form in ("quaternion", "matrix", "euler") if form in columns]
     rows = {form: said.rotation(form, columns[form]) for form in forms}
     errors: dict[tuple[str, str], Array] = {}
@@ -400,7 +402,7 @@ def of_states(
     times: Sequence[Fraction],
     states: Sequence[Sequence[Fraction | None]],
     xi: Sequence[Fraction] | None = None,
-) -> Seen | None:
+) -> Observations | None:
     """A file in principal axes of Ω and γ, or with ξ of Ω and a quaternion; None where no double holds its numbers."""
     try:
         columns = numpy.array(states, dtype=float)
@@ -420,7 +422,7 @@ def of_states(
         products: Array = numpy.array(quaternion_products(rows_of(up, first)))
         largest = numpy.einsum("iin->ni", products).argmax(axis=1)
         split = {"omega": columns[:, :3], "quaternion": products[largest, :, range(len(columns))]}
-    return Seen(tuple(times), split, body, reading, Reading(), body.centre, numpy.zeros(3))
+    return Observations(tuple(times), split, body, reading, Reading(), body.centre, numpy.zeros(3))
 
 
 def body_data(body: HeavyTop | Body) -> BodyData:

@@ -1,7 +1,7 @@
-"""Samples of a motion in double, and how far a supposed motion is from them: what every diagnosis is tested with.
+"""Samples of a motion in double, and their errors relative to a simulated one: the test of every hypothesis.
 
-Here a motion is compared with heyoka in double, quickly and many times over.  Errors are relative to the size of Ω and
-of γ along the supposed motion, so that units do not matter.
+Motions are simulated by heyoka in double.  Errors are relative to the size of Ω and of γ along the simulated motion, so
+that units do not matter.
 """
 
 from __future__ import annotations
@@ -24,30 +24,30 @@ from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 WITH_ATTITUDE = (HEAVY_TOP, HEAVY_GYROSTAT)
-"""Systems whose attitude rides along."""
+"""Systems with which an attitude is integrated."""
 
 VARIES, AS_AT_START = "varies", "that of the start"
-"""Words for first integrals that do not keep another value."""
+"""Texts for first integrals that vary, or keep the value of the start."""
 MOST_SAMPLES = 24
 _TURNS = 60.0
-"""Radians that the body turns until the last sample that is looked at, if there are a few samples before."""
+"""Radians that the body turns until the last sample compared, if there are a few samples before."""
 _FEW = 6
 _FEWEST = 3
 _STEPS = 50_000
-"""Steps of heyoka in one supposed motion: they take a tenth of a second."""
+"""Most steps of heyoka in one simulated motion: they take a tenth of a second."""
 _LONGEST = 1e5
 """Radians that a body may turn in so many steps, roughly."""
 FARTHEST = 3000.0
-"""Radians that the body may turn until the last supposed time."""
+"""Radians that the body may turn until the last simulated time."""
 _OTHER_UNIT = Fraction(11, 10)
-"""Of time and of moments: all data are rounded otherwise in it."""
+"""Another unit of time and of moments, in which all data round differently."""
 _TRUSTED = 1e-11
-"""heyoka's states are trusted until those in other units part from them by so much, relative to their size."""
+"""heyoka's states are trusted while those in other units agree to that, relative to their size."""
 _USUAL = 3.0
-"""Decades by which a unit may be off before another is taken."""
+"""Decades by which data may differ from 1 before they are rescaled."""
 MOST_AT_ONCE = 2000
 _NOTABLE = 0.02
-"""A fitted number must be off by this part or be a short decimal: methods have small biases of their own."""
+"""A fitted number must differ by this part or be a short decimal: methods have small biases."""
 SHORT = 4
 _DIGITS = range(1, SHORT + 1), range(SHORT + 1, 13)
 """Digits of a short decimal, and of a longer one."""
@@ -59,7 +59,7 @@ _ANISOTROPY = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """Powers of ten in which times and moments of inertia are neither large nor small."""
+    """Powers of ten, units in which times and moments of inertia are neither large nor small."""
 
     time: Fraction = Fraction(1)
     inertia: Fraction = Fraction(1)
@@ -72,7 +72,7 @@ class Units:
 
 @dataclass(frozen=True, slots=True)
 class FileAxes:
-    """Axes of the body in which a file gives its vectors, and what its columns are.
+    """Axes of the body in which a file gives its vectors, and its columns.
 
     axes: A with v_file = A v_principal.  xi: the attitude vector at t = 0 in principal axes; None where no attitude is
     given.  columns: the places of those of Ω1 Ω2 Ω3 γ1 γ2 γ3 that are columns of the file.
@@ -85,14 +85,14 @@ class FileAxes:
 
 @dataclass(frozen=True, slots=True)
 class Examined:
-    """A motion as it was given, at the samples that are looked at.
+    """The motion of a file at the samples that are compared.
 
     top, start: in principal axes; everything else in the axes of the file.
-    all_times, all_states: the whole of it.  rows: the places of those samples in it.
+    all_times, all_states: of the whole file.  rows: the indices of the compared samples in it.
     states: of these rows, shape (n, 6), in double, or (n, 9) with ξ where there is an attitude; nan where the file does
     not give a vector.
     units: everything is in these.  rate: radians per time unit, roughly, at which the motion turns.
-    refused: the error of the first samples beyond which a motion explains nothing.
+    refused: the error of the first samples beyond which a motion is refuted.
     """
 
     top: HeavyTop
@@ -109,7 +109,7 @@ class Examined:
 
     @property
     def times(self) -> list[Fraction]:
-        """Times of the rows that are looked at."""
+        """Times of the compared rows."""
         return [self.all_times[row] for row in self.rows]
 
     @property
@@ -154,7 +154,7 @@ class Examined:
         )
         return replace(self, top=top, frame=replace(self.frame, axes=axes)).starting(start)
 
-    def supposed(self, times: Sequence[Fraction]) -> Array | None:
+    def simulated(self, times: Sequence[Fraction]) -> Array | None:
         """The motion at any times, of both signs and in any order.
 
         None where it cannot be computed, and beyond :data:`FARTHEST` radians.
@@ -177,14 +177,14 @@ class Examined:
         return self.at(range(sum(reached))).trusted()
 
     def trusted(self) -> Examined:
-        """This motion up to where it makes more of roundings than an error that is asked about."""
-        truth, unit = self.supposed(self.times) if self.rows else None, _OTHER_UNIT
+        """This motion up to where rounding errors grow beyond the errors that are diagnosed."""
+        truth, unit = self.simulated(self.times) if self.rows else None, _OTHER_UNIT
         if truth is None:
             return self
         top = HeavyTop([i * unit for i in self.top.inertia], self.top.weight / unit, self.top.centre, self.top.rotor)
         start = State([w / unit for w in self.start.omega], self.start.gamma)
         slower = replace(self, rate=self.rate / float(unit), top=top, start=start)
-        other = slower.supposed([time * unit for time in self.times])
+        other = slower.simulated([time * unit for time in self.times])
         if other is None:
             return self
         states = other * numpy.array([float(unit)] * 3 + [1.0] * (other.shape[1] - 3))
@@ -192,20 +192,20 @@ class Examined:
         return self.at(self.rows[: int(numpy.argmax(far))]) if far.any() else self
 
     def follows(self, row: int) -> Array | None:
-        """The state at the sample behind ``row`` that the motion through the state given there has; None for none."""
+        """The state at the sample after ``row`` of the motion through the given state of ``row``; None without one."""
         span = self.all_times[row + 1] - self.all_times[row]
         if abs(float(span)) * self.rate > FARTHEST:
             return None
         if numpy.isnan(self.all_states[row]).any():
             return None
         try:
-            states = self.starting(self.all_states[row]).supposed([span])
+            states = self.starting(self.all_states[row]).simulated([span])
         except HeavyTopError:  # beyond the numbers that a start may have
             return None
         return None if states is None else states[0]
 
     def errors(self, supposed: Array | None) -> Array:
-        """The error of each state relative to the size of Ω and γ in the supposed ones; infinite without any.
+        """The error of each state relative to the size of Ω and γ in the simulated ones; infinite without any.
 
         supposed: shape (..., n, 6 or more), of as many motions as the axes before say.
         """
@@ -222,7 +222,7 @@ class Examined:
         return numpy.nan_to_num(errors, nan=numpy.inf, posinf=numpy.inf)
 
     def refusing(self, own: float) -> Examined:
-        """This motion, whose error is ``own``, with the error of its first samples that refuses another."""
+        """This motion, whose error is ``own``, with the error of its first samples that refutes a hypothesis."""
         omega = numpy.nan_to_num(numpy.abs(self.states[:, :3]), nan=1.0)
         return replace(self, refused=refused(float(omega[: self._first].max()), float(omega.max()), own))
 
@@ -230,22 +230,22 @@ class Examined:
     def _first(self) -> int:
         return FIRST[0] + (not self.times[0])
 
-    def beside(self, times: Sequence[Fraction] | None = None) -> Array:
-        """The error of each sample beside the motion, or that at other times; infinite behind a refusal."""
+    def motion_errors(self, times: Sequence[Fraction] | None = None) -> Array:
+        """The error of each sample relative to the motion, or to that at other times; infinite after a refutation."""
         times = self.times if times is None else times
         early = self.at(self.rows[: self._first])
-        errors = early.errors(early.supposed(times[: self._first]))
+        errors = early.errors(early.simulated(times[: self._first]))
         if len(errors) == len(self.rows):
             return errors
         if not errors.max() <= self.refused:
             return numpy.append(errors, numpy.full(len(self.rows) - len(errors), numpy.inf))
-        return self.errors(self.supposed(times))
+        return self.errors(self.simulated(times))
 
 
 def refused(early: float, largest: float, own: float) -> float:
-    """The error of the first samples beyond which a motion explains nothing, also relative to the largest Ω.
+    """The error of the first samples beyond which a motion is refuted, also relative to the largest Ω.
 
-    early, largest: |Ω| of the first samples and of all.  own: the error without a mistake.
+    early, largest: |Ω| of the first samples and of all.  own: the error of the file as it stands.
     """
     growth = _ANISOTROPY * largest / early if early else numpy.inf
     return float(growth * (own if numpy.isfinite(own) else 1.0) / LIKELY_DROP)
@@ -288,7 +288,7 @@ def examined(
     fall = (numpy.linalg.norm(moment) / float(max(inertia))) ** 0.5
     carried = numpy.linalg.norm([float(k) for k in top.rotor or ()]) / float(max(inertia))
     rate = float(max(spin, fall, carried)) or 1.0
-    rows = looked_at(ends, rate)
+    rows = chosen_rows(ends, rate)
     if worst is not None and worst < rows[-1]:
         rows = sorted({*rows, worst})
     samples = Examined(
@@ -298,7 +298,7 @@ def examined(
     return trusted if len(trusted.rows) >= min(_FEWEST, len(rows)) else samples
 
 
-def looked_at(times: Sequence[float], rate: float) -> list[int]:
+def chosen_rows(times: Sequence[float], rate: float) -> list[int]:
     """At most :data:`MOST_SAMPLES` samples over the first turns of the body, or a few where they lie far apart."""
     early = sum(abs(time) * rate <= _TURNS for time in times)
     last = max(early, min(len(times), _FEW))
@@ -363,7 +363,7 @@ def motion_in_double(system: System, numbers: Array, first: Array, times: Array)
 
 @lru_cache(maxsize=512)
 def _states_by_time(system: System, numbers: bytes, first: bytes) -> dict[float, Array]:
-    """States of a motion that were computed: hypotheses are tried on the first samples, and again on all."""
+    """Computed states of a motion by time: hypotheses are tried on the first samples, and again on all."""
     return {}
 
 
@@ -382,7 +382,7 @@ def floats(values: Sequence[Fraction]) -> Array:
     return numpy.array([float(value) for value in values])
 
 
-def named(value: float, near: float) -> Fraction:
+def plain_number(value: float, near: float) -> Fraction:
     """0, a short decimal, a small fraction or the shortest decimal within ``near``, or the value itself."""
     if abs(value) <= near:
         return Fraction(0)

@@ -1,7 +1,7 @@
-"""Hypotheses about a file, each tried once, and the simplest that explains all samples looked at, or the first ones.
+"""Hypotheses about a file, each tried once, and the simplest that explains all samples compared, or the first ones.
 
-A hypothesis counts if the error falls by two decades with it, by three where a number was fitted; where several do
-about as well the simplest is named.  Of the first samples a fall by a factor of 30 makes one without a number likely.
+A hypothesis is accepted if the error falls by two decades, by three where a number was fitted; of several that fit
+about as well the simplest is named.  In the first samples a fall by a factor of 30 makes one without a number likely.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ from heavytop.precision import plain_decimal
 Array = NDArray[numpy.float64]
 
 WORTH_ASKING = 1e-10
-"""Relative errors below it are no mistake."""
+"""Relative errors below it are not diagnosed."""
 ALIKE = 30.0
-"""Of hypotheses whose errors differ by less, the simplest is meant; ..."""
+"""Of hypotheses whose errors differ by less than this factor the simplest is accepted; ..."""
 AS_LIKELY = 3.0
-"""... so of likely ones."""
+"""... of likely ones by less than this."""
 FLOOR = 1e-13
 """Relative errors below it are heyoka's own."""
 DROP = 100.0
-"""Errors must fall by so much for a hypothesis without a free number, and ..."""
+"""Factor by which errors must fall for a hypothesis without a free number, ..."""
 FITTED_DROP = 1000.0
-"""... by so much for one whose numbers were fitted; ..."""
+"""... and for one whose numbers were fitted; ..."""
 LIKELY_DROP = 30.0
-"""... one without a free number by which it falls less is likely."""
+"""... by this factor one without a free number is likely."""
 _NOTHING = 0.5
-"""A hypothesis that leaves more explains nothing, however large the error is without it."""
+"""A hypothesis that leaves a larger error explains nothing, however large the error is without it."""
 FIRST = (6, 2)
-"""Of the samples away from t = 0, those judged by themselves: there a method of low order is off by little."""
+"""Numbers of first samples after t = 0 that are judged by themselves: a method of low order is off by little there."""
 _MOST_OTHERS = 3
 
 
@@ -46,10 +46,10 @@ class Diagnosis:
     """A mistake that explains the states.
 
     kind: which; docs/score.md lists them.  numbers: what fits, as text, by name.
-    error: the largest error of the states that were looked at, relative to the size of Ω and of γ; left: what is left
-    of it if the mistake is mended.  Both None where nothing was tried: then the states themselves show it.
-    looked_at: how many of the states, of how many, and the time of the last of them, as text, where not all were.
-    likely: whether the error falls by less than a statement asks for.  others: what explains them as well.
+    error: the largest error of the states compared, relative to the size of Ω and of γ; left: the error that remains
+    once the mistake is corrected.  Both None where nothing was tried: the states themselves show it.
+    looked_at: how many states were compared, of how many, and the time of the last, as text; None for all.
+    likely: whether the error falls by less than a definite statement requires.  others: hypotheses that fit as well.
     """
 
     kind: str
@@ -62,7 +62,7 @@ class Diagnosis:
 
 
 def rounded(written: Sequence[Rounding], error: float | None) -> list[Diagnosis]:
-    """That the digits written explain the error, which is neither larger than they make it nor far smaller."""
+    """The diagnosis that rounding to the digits written explains the error: it is neither larger nor far smaller."""
     explaining = (rounding for rounding in written if error is not None and explains(rounding, error))
     return [Diagnosis("rounded", {"to": each.kind, "digits": str(each.digits)}) for each in explaining][:1]
 
@@ -70,8 +70,8 @@ def rounded(written: Sequence[Rounding], error: float | None) -> list[Diagnosis]
 class Hypothesis(NamedTuple):
     """A mistake that was tried.
 
-    numbers: that fit.  errors: that it leaves of each sample, or of all but one at an end.
-    drop: how far the error must fall.  is_round: whether a number that was fitted is one of three digits.
+    numbers: that fit.  errors: that remain in each sample, or in all but one at an end.
+    drop: the factor by which the error must fall.  is_round: whether a fitted number has at most three digits.
     """
 
     kind: str
@@ -81,19 +81,19 @@ class Hypothesis(NamedTuple):
     is_round: bool = False
 
     def left(self, looked: int | None = None) -> float:
-        """The largest error that it leaves of the first so many samples."""
+        """The largest error that remains in the first so many samples."""
         return float(self.errors[:looked].max())
 
     def least_fall(self, likely: float) -> float:
-        """How far the error must fall; by less, ``likely`` or for a round number DROP, where it need only be likely."""
+        """Factor by which the error must fall; ``likely``, or DROP for a round number, where it need only be likely."""
         return self.drop if not likely else likely if self.drop == DROP else DROP if self.is_round else self.drop
 
 
 class Search:
     """The search for the mistake of a file.
 
-    own: the error of each sample that is looked at, as the file stands.  times: of these, in units of the file.
-    states: how many the file has.  names_others: whether a diagnosis names what explains the file as well.
+    own: the error of each sample compared, as the file stands.  times: of these, in units of the file.
+    states: how many the file has.  names_others: whether a diagnosis names hypotheses that fit as well.
     """
 
     own: Array
@@ -106,7 +106,7 @@ class Search:
         raise NotImplementedError
 
     def further(self, diagnosis: Diagnosis | None, own: float) -> Iterator[Hypothesis]:
-        """What is tried only where nothing, or nothing better than this, explains an error."""
+        """Hypotheses that are tried only where nothing, or nothing better than this, explains the error."""
         raise NotImplementedError
 
     @cached_property

@@ -14,7 +14,7 @@ import numpy
 from heavytop import written_numbers
 from heavytop.arguments import MOST_STATES, bits_of, component
 from heavytop.errors import InputError, prefixed
-from heavytop.features.score.diagnose.readings import GivenStart, Reading, Seen, body_data
+from heavytop.features.score.diagnose.readings import GivenStart, Observations, Reading, body_data
 from heavytop.features.score.diagnose.samples import floats
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.attitude_error import Convention, Posed, space_to_body
@@ -380,7 +380,7 @@ class Observed:
         """The numbers of one row."""
         return {name: rows[row] for name, rows in self.columns.items()}
 
-    def seen(self, times: Sequence[Fraction]) -> Seen | None:
+    def seen(self, times: Sequence[Fraction]) -> Observations | None:
         """The samples in double; None where no double holds them."""
         try:
             columns = {name: numpy.array(rows, dtype=float) for name, rows in self.columns.items()}
@@ -395,7 +395,7 @@ class Observed:
         said = Reading.of(self.said)
         if self.start.form == "euler" and self.start.degrees != said.degrees and "euler" not in columns:
             said = replace(said, degrees=self.start.degrees)
-        return Seen(tuple(times[:count]), columns, body, start, said, of, pivot) if count else None
+        return Observations(tuple(times[:count]), columns, body, start, said, of, pivot) if count else None
 
 
 def _start(raw: RawStart, posed: Posed) -> GivenStart:
