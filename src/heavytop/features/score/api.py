@@ -1,4 +1,4 @@
-"""How good a motion is, from Python: drift of its first integrals, distance from the known motion, digits right."""
+"""Python interface of the score: drift of first integrals, distance from the known motion, digits right."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The explanation of states that are far off: a sign, a step too many, a row too late."""
+"""Explanation of a run that is far off: a sign, a step too many, a row too late."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Motions computed elsewhere, scored like our own: no plan asks for them, `heavytop score` makes their rows."""
+"""Kind of the rows that `heavytop score` makes of trajectories computed elsewhere; no plan contains it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A motion computed elsewhere, scored like our own, beside heyoka's, and with what explains its error."""
+"""Score of a trajectory computed elsewhere: its row, heyoka's digits over the same times, its diagnosis."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ from heavytop.records import Metric, Peer, Row, RowKey, Subject, by_name
 
 Progress = Callable[[], None]
 
-# Attitudes, positions and Ω in any axes, scored like a state: how many digits of the columns are right, and why.
+# Diagnosis of a scored trajectory of states, or of attitudes, positions and Ω in any axes.
 
 
 _OVERLAP = 1e-6
-"""Columns that say the same must agree to that."""
+"""Columns of one quantity must agree to that."""
 _PART = 0.1
-"""A length explains an error that is at most so many times as large, turned over."""
+"""A length off 1 explains the error if it is at least this part of it."""
 _WORDS = {
     "omega": "Ω in body axes",
     "omega_space": "Ω in axes of space",
@@ -88,29 +88,31 @@ def diagnoses(trajectory: GivenTrajectory, error: float | None, errors: Sequence
     about: dict[str, Any] = {"step": trajectory.step}
     count = len(_finite(trajectory))
     times, states = trajectory.times[:count], _finite(trajectory)
-    said: list[Diagnosis] = []
+    explanations: list[Diagnosis] = []
     if (observed := trajectory.observed) is not None:
-        seen = observed.seen(times)
-        said = [] if seen is None else _disagreements(seen, times)
+        samples = observed.observations(times)
+        explanations = [] if samples is None else _disagreements(samples, times)
         digits_written = rounded(_amplified(observed, roundings(states, trajectory.precision)), error)
         if error is not None and (error <= WORTH_ASKING or digits_written):
-            return said + digits_written
+            return explanations + digits_written
         lengths = _lengths(observed, times, trajectory.precision)
         if lengths is not None and (error is None or float(lengths.error or 0) >= _PART * error):
-            return [*said, lengths]
-        if seen is None:
-            return said
-        states, about["seen"], about["frame"] = _in_axes_of_file(seen), seen, _frame(observed)
+            return [*explanations, lengths]
+        if samples is None:
+            return explanations
+        states, about["seen"], about["frame"] = _in_axes_of_file(samples), samples, _frame(observed)
     elif len(errors) == count and max(error or 0.0, *errors) <= WORTH_ASKING:
         return rounded(roundings(states, trajectory.precision), error)
     from heavytop.features.score.diagnose.diagnosis import diagnose  # a right file needs none of it
 
     top, start = trajectory.top, trajectory.start
-    return said + diagnose(top, start, trajectory.system, times, states, trajectory.precision, error, errors, **about)
+    return explanations + diagnose(
+        top, start, trajectory.system, times, states, trajectory.precision, error, errors, **about
+    )
 
 
 def _amplified(observed: Observed, written: Sequence[Rounding]) -> list[Rounding]:
-    """Roundings of the columns with the errors of what follows from them."""
+    """Roundings of the columns, with the errors that they cause in the scored quantities."""
     arm = math.sqrt(float(dot(observed.posed.centre, observed.posed.centre)))
     sizes = {"quaternion": 4.0, "euler": 3.0, "position": max(2.0, 2.0 / arm) if arm else 2.0}
     factor = max(sizes.get(name, 1.0) for name in observed.names)
@@ -124,23 +126,23 @@ def _frame(observed: Observed) -> FileAxes:
     return FileAxes(axes, observed.posed.xi if set(FORMS) & set(observed.names) else None, tuple(columns))
 
 
-def _in_axes_of_file(seen: Observations) -> list[tuple[Any, ...]]:
+def _in_axes_of_file(samples: Observations) -> list[tuple[Any, ...]]:
     """Ω, γ and, of an attitude, ξ of each sample in the axes of the file; None for what it does not give."""
-    unknown, said, columns = numpy.full((len(seen.times), 3), numpy.nan), seen.said, seen.columns
+    unknown, reading, columns = numpy.full((len(samples.times), 3), numpy.nan), samples.said, samples.columns
     form = next((form for form in FORMS if form in columns), None)
     omega, gamma = (columns.get(name, unknown) for name in ("omega", "gamma"))
     parts = [omega, gamma]
     if form is not None:
-        rotation = said.rotation(form, columns[form])
+        rotation = reading.rotation(form, columns[form])
         parts = [omega, rotation[:, 2], rotation[:, 0]]
         if "omega" not in columns and "omega_space" in columns:
-            parts[0] = numpy.einsum("nji,nj->ni", rotation, said.vectors(columns["omega_space"], True))
+            parts[0] = numpy.einsum("nji,nj->ni", rotation, reading.vectors(columns["omega_space"], True))
     rows = numpy.hstack(parts).tolist()
     return [tuple(None if value != value else Fraction(value) for value in row) for row in rows]
 
 
 def _lengths(observed: Observed, times: Sequence[Fraction], precision: Precision) -> Diagnosis | None:
-    """Quaternions whose length is not 1, by more than roundings make of it."""
+    """The diagnosis of quaternions whose length differs from 1 by more than rounding."""
     rows = observed.columns.get("quaternion", [])
     off = [abs(dot(row, row) + row[3] ** 2 - 1) / 2 for row in rows]
     if not off or max(off) <= 2**10 * precision.eps:
@@ -150,35 +152,35 @@ def _lengths(observed: Observed, times: Sequence[Fraction], precision: Precision
     return Diagnosis("quaternion_length", {"off": size, "t": plain_decimal(times[worst], 6)}, float(off[worst]))
 
 
-def _disagreements(seen: Observations, times: Sequence[Fraction]) -> list[Diagnosis]:
-    """Columns that say the same and differ."""
+def _disagreements(samples: Observations, times: Sequence[Fraction]) -> list[Diagnosis]:
+    """Diagnoses of columns that give one quantity and differ."""
     with numpy.errstate(all="ignore"):
-        apart = disagreement(seen)
-    said = []
+        apart = disagreement(samples)
+    explanations = []
     for (one, other), off in apart.items():
         if float(off.max()) > _OVERLAP:
             row = int(numpy.argmax(off > _OVERLAP))
             numbers = {"columns": f"{_WORDS[one]} and {_WORDS[other]}", "by": f"{float(off.max()):.2e}"}
-            said.append(Diagnosis("columns_disagree", {**numbers, "t": plain_decimal(times[row], 6)}))
-    return said
+            explanations.append(Diagnosis("columns_disagree", {**numbers, "t": plain_decimal(times[row], 6)}))
+    return explanations
 
 
 def used(observed: Observed) -> str:
-    """Which columns were scored, and how they were read."""
-    said = observed.said
+    """The sentence that names the scored columns and their conventions."""
+    convention = observed.convention
     how = {
-        "quaternion": f" ({said.quaternion_order}, {said.quaternion.replace('_', ' ')})",
-        "matrix": f" ({said.matrix.replace('_', ' ')})",
-        "euler": f" ({said.sequence}, {said.angles})",
-        "position": " of the centre of mass" if said.point is None else " of the point",
+        "quaternion": f" ({convention.quaternion_order}, {convention.quaternion.replace('_', ' ')})",
+        "matrix": f" ({convention.matrix.replace('_', ' ')})",
+        "euler": f" ({convention.sequence}, {convention.angles})",
+        "position": " of the centre of mass" if convention.point is None else " of the point",
     }
-    up = f"; {said.up} points up" if set(observed.names) - {"omega", "gamma"} else ""
+    up = f"; {convention.up} points up" if set(observed.names) - {"omega", "gamma"} else ""
     return f"Scored: {', '.join(_WORDS[name] + how.get(name, '') for name in observed.names)}{up}."
 
 
 PEER = "heyoka"
 _CLOCK = Fraction(1, 1000)
-"""Of a step, by which the times of a clock may be off its multiples."""
+"""Part of a step by which the times of a clock may differ from its multiples."""
 _ROUNDED = 4
 """Roundings of a product."""
 _NOTICED = 0.05
@@ -193,7 +195,7 @@ _PROBE, _SLOWER = 50, 2
 
 @dataclass(frozen=True, slots=True)
 class Assessment:
-    """How good a motion is.
+    """The score of a trajectory.
 
     row: what was measured.  peer: heyoka's run; None without a reference, and where heyoka does not get there.
     diagnoses: what explains the error; empty where nothing does.  format_guessed: whether the format is not named in
@@ -268,17 +270,17 @@ def assess(trajectory: GivenTrajectory, progress: Progress = lambda: None) -> As
     scored = measured(trajectory, progress)
     count = len(_finite(trajectory))
     clock, explained, moved = _of_clock(trajectory, scored.row) or (None, scored, trajectory)
-    said = diagnoses(moved, _size(explained.row), explained.errors) if count else []
+    explanations = diagnoses(moved, _size(explained.row), explained.errors) if count else []
     written = [] if trajectory.observed is not None else roundings(_finite(trajectory), trajectory.precision)
     single = [rounding.kind for rounding in written[:1]] == ["single"]
     peer = _peer(trajectory, scored, count, progress)
     columns = "" if trajectory.observed is None else used(trajectory.observed)
-    said = said if clock is None else [clock, *said]
-    return Assessment(scored.row, peer, said, trajectory.format_guessed, single, columns, trajectory.cut)
+    diagnosed = explanations if clock is None else [clock, *explanations]
+    return Assessment(scored.row, peer, diagnosed, trajectory.format_guessed, single, columns, trajectory.cut)
 
 
 def _of_clock(trajectory: GivenTrajectory, row: Row) -> tuple[Diagnosis, Scored, GivenTrajectory] | None:
-    """How many digits are right where the times are multiples of the step, if these are more."""
+    """The diagnosis that times are off multiples of the step, if more digits are right at these multiples."""
     exactly = _on_multiples(trajectory)
     if exactly is None:
         return None
@@ -307,7 +309,7 @@ def measured(trajectory: GivenTrajectory, progress: Progress = lambda: None) -> 
     scorer: Scorer | ObservedScorer = (
         Scorer(problem, known, keep)
         if observed is None
-        else ObservedScorer(problem, known, observed.posed, observed.said, observed.names, keep)
+        else ObservedScorer(problem, known, observed.posed, observed.convention, observed.names, keep)
     )
     if observed is not None:
         samples = map(observed.sample, range(min(map(len, observed.columns.values()), default=0)))
@@ -327,7 +329,7 @@ def _row(
     keep: list[Fraction],
     scorer: DriftAndError,
 ) -> Row:
-    """The row of what a scorer has taken in.  times: all of them, rounded to the format."""
+    """The row of the states that the scorer compared.  times: all of them, rounded to the format."""
     precision, states = trajectory.precision, _finite(trajectory)
     count = len(states)
     run = Trajectory(
@@ -348,8 +350,12 @@ def _row(
     )
     task = Task(key, "", trajectory.integrator, case, tuple(times), tuple(keep))
     row = computed_row(task, run, scorer.metrics(), scorer.series(time_text), scorer.against)
-    said = {"measured": f"given: {trajectory.integrator}", "order": None, "time_reached": time_text(run.time_reached)}
-    return msgspec.structs.replace(row, **said, data=data_of(case))
+    changes = {
+        "measured": f"given: {trajectory.integrator}",
+        "order": None,
+        "time_reached": time_text(run.time_reached),
+    }
+    return msgspec.structs.replace(row, **changes, data=data_of(case))
 
 
 def _finite(trajectory: GivenTrajectory) -> list[tuple[Fraction, ...]]:

@@ -1,4 +1,4 @@
-"""Several trajectory files at once, in parallel, and the order that files show which differ in their step alone."""
+"""Scores of several trajectory files in parallel, and the order shown by files that differ only in their step."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from heavytop.processes import ChildContext
 from heavytop.report.document.document import clip
 
 _ABOVE_ROUNDING = 1000
-"""Times eps: an error from which an order is read."""
+"""Multiple of eps above which an error shows an order."""
 _WIDTH = 44
 
 
@@ -30,7 +30,7 @@ _WIDTH = 44
 class ScoredFile:
     """A file with its score, or why it is missing.
 
-    method: what files have in common that differ in their step alone; step: 0 where the file does not say it.
+    method: equal for files that differ only in their step; step: 0 where the file does not state it.
     required: whether it has the digits that were required, in a sentence.
     """
 

@@ -44,7 +44,7 @@ from heavytop.report.document.document import (
 from heavytop.report.document.svg import COLOURS, decades, finish, new_axes, spoken
 from heavytop.report.render.text import Lines, wrapped
 
-# Mistakes of convention in a sentence each: what fits, where it was found, and how many digits are right with it.
+# Sentences of mistakes of convention: what fits, where it was found, and how many digits are right with it.
 
 
 _MEANINGS = {
@@ -55,7 +55,7 @@ _MEANINGS = {
     "omega_in_turns": ("Ω is in turns per time unit", ", not in radians"),
     "omega_in_rpm": ("Ω is in turns per 60 time units", " (rpm where times are in s), not in radians"),
 }
-"""Meanings of the columns, and how they fit."""
+"""Readings of the columns, and how they fit."""
 _CONVENTION_SENTENCES = {
     **{kind: "".join(_MEANINGS[kind]) for kind in _MEANINGS if "_in_" in kind},
     "scalar_last": "The quaternions have their scalar part in the other place: quaternion_order = {quaternion_order}",
@@ -120,7 +120,7 @@ _CONVENTION_SENTENCES = {
 
 
 def is_convention(fit: Diagnosis) -> bool:
-    """Whether it is said here."""
+    """Whether the diagnosis is one of convention."""
     # other files have mistakes of the same names, without a word on where they were found
     is_ours = fit.left is None or "of" in fit.numbers
     return is_ours and all(kind in _CONVENTION_SENTENCES for kind in fit.kind.split("+"))
@@ -154,7 +154,7 @@ def _mistake(fit: Diagnosis) -> str:
     return said + where.get(numbers.get("of", ""), "")
 
 
-# What explains the error of a motion, in a sentence each.
+# Sentences of the other diagnoses.
 
 
 _SENTENCES = {
@@ -221,7 +221,7 @@ _WHOSE = {"omega": "Ω is", "both": "Ω and γ are"}
 
 
 def cause(fit: Diagnosis, system: str) -> str:
-    """What fits, without how far the error falls."""
+    """The mistake in words, without the fall of the error."""
     return _mistake(fit) if is_convention(fit) else _said(fit, system)
 
 
@@ -241,7 +241,7 @@ def diagnosis_text(fit: Diagnosis, system: str = "heavy_top") -> str:
 
 
 def _scope(fit: Diagnosis) -> str:
-    """The states of which the sentence is true, where not all were looked at."""
+    """The states for which the sentence holds, where not all were compared."""
     if fit.looked_at is None:
         return ""
     looked, states, until = fit.looked_at
@@ -307,7 +307,7 @@ def _columns(numbers: dict[str, str]) -> str:
 
 
 def _integrals_off(numbers: dict[str, str]) -> str:
-    """The course of each first integral, those first that keep another value."""
+    """The behaviour of each first integral, those first that keep another value."""
     off = [f"{name} ({value})" for name, value in numbers.items() if value not in (VARIES, AS_AT_START)]
     said = [f"from the first sample on {_listed(off)} {_keep(off)} another value than at the start"]
     for text, verb in ((AS_AT_START, "{} the value of the start"), (VARIES, "")):
@@ -375,7 +375,7 @@ def requirement(row: Row, needed: Fraction, cut: str = "") -> str:
 
 
 def guessed(assessment: Assessment) -> str | None:
-    """That the format was not named, and what it was taken for."""
+    """The sentence that names the format inferred from the digits; None where the file names it."""
     if not assessment.format_guessed:
         return None
     name = assessment.row.precision
@@ -392,7 +392,7 @@ def told(assessment: Assessment) -> list[str]:
 
 
 def to_json(assessment: Assessment) -> dict[str, Any]:
-    """The row, and beside it what `score --json` says more."""
+    """The document of `score --json`: the row, the digits, the peer and the diagnosis."""
     peer = None if assessment.peer is None else asdict(assessment.peer)
     said = [asdict(fit) | {"sentence": diagnosis_text(fit, assessment.row.system)} for fit in assessment.diagnoses]
     answers = {
@@ -445,7 +445,7 @@ def _wrapped(text: str) -> list[Text]:
     return [Text(line) for line in wrapped(text, "")]
 
 
-# What a report says of one scored motion: digits right, at the end and over time.
+# Page of one scored trajectory: digits right, at the end and over time.
 
 
 _SIZES = "", "largest", "rms", "final"
@@ -460,13 +460,13 @@ _CURVES = {
 
 
 def score_report(assessment: Assessment, environment: dict[str, Any], sha256: str = "") -> Report:
-    """A report with this row alone, which `compare` understands, and what its page says beside the row."""
+    """A report of this row alone, which `compare` reads, with the remarks of its page."""
     beside = Beside(assessment.peer, tuple(told(assessment)))
     return Report(SCHEMA, {"name": "score", "sha256": sha256}, environment, [assessment.row], beside)
 
 
 def one_motion(row: Row, beside: Beside) -> Iterator[Block]:
-    """How good a scored motion is, what explains its error, how its digits are lost, and the same in numbers."""
+    """Digits right, explanations of the error, digits over time, and the table of errors and drifts."""
     first, *others = answer(row, beside.peer)
     yield Headline(first)
     compared = f"Reference: {row.reference.brief}."

@@ -14,7 +14,7 @@ from heavytop.extras import require_extra
 SUFFIXES = (".mcap", ".bag", ".db3")
 _NAMES = ("orientation.w", "rotation.w", "angular_velocity.x", "angular.x", "quaternion.w")
 _ABOUT = "/heavytop"
-"""A topic of std_msgs/String whose lines stand for the comments above a table: `mass: 2`."""
+"""A topic of std_msgs/String with the comments of the table, such as `mass: 2`."""
 
 
 def storage(folder: Path) -> Path:
@@ -70,7 +70,7 @@ def _opened(path: Path) -> Iterator[Any]:
 
 
 def _flat(value: Any, name: str) -> Iterator[tuple[str, str]]:
-    """Names and texts of the numbers in a message; of a list of one message those of this one."""
+    """Names and texts of the numbers in a message; a list of one message counts as that message."""
     if is_dataclass(value):
         for part in fields(value):
             if not part.name.startswith("__"):

@@ -1,4 +1,4 @@
-"""Columns of attitudes, positions and Ω in any axes in tables of other programs: their names, places and cells."""
+"""Columns of attitudes, positions and Ω in any axes in files of other programs: names, units, conventions, numbers."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _PATTERNS = tuple(
         ("position", r"(?:p|pos|position|com|centre|center|centreofmass|r|point)?([xyz])"),
     )
 )
-"""The names of each quantity, tried in this order; what the groups hold is the component."""
+"""Patterns of the names of each quantity, tried in this order; their groups are the component."""
 _NAMES = {
     name: (quantity, component)
     for quantity, component, names in (
@@ -58,7 +58,7 @@ _AXES = {"x": "1", "y": "2", "z": "3"}
 _CLASSIC = ("p", "q", "r")
 _TIME = ("t", "time", "timestamp", "stamp")
 _TOGETHER = (tuple("wxyz"), tuple("xyzw"), ("e0", "e1", "e2", "e3"))
-"""Names of four columns beside each other that are a quaternion, and alone are something else or nothing."""
+"""Names of four adjacent columns that are a quaternion, though each alone is another quantity or none."""
 _SAID = re.compile(r"[\[(]\s*([^\[\]()]*?)\s*[\])]$|^[^\[(/]*/\s*(.+)$")
 """Unit in the last brackets of a name, or behind its first slash."""
 _A_SECOND = ("/s", "/sec", "/second", "s-1")
@@ -77,19 +77,19 @@ _METRE = {"mm": Fraction(1, 10**3), "cm": Fraction(1, 100)}
 _LENGTHS = ("m", *_METRE)
 _OMEGA = ("omega", "omega_space", "framed")
 _UNITS = {"t": _SECOND, "omega": _RATE, "omega_space": _RATE, "framed": _RATE, "position": _METRE}
-"""Units that a header may have, in those of the data: s, rad/s (of these as multiples of π) and m."""
+"""Units of a header in those of the data: s, rad/s (as multiples of π) and m."""
 
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """A unit that the header says, and what it is in that of the data.  turning: whether π is a factor of it too."""
+    """A unit of the header and its size in that of the data.  turning: whether π is a further factor."""
 
     name: str
     size: Fraction
     turning: bool = False
 
     def factor(self, digits: int) -> Fraction:
-        """Factor of the unit for numbers of so many digits; π to many more."""
+        """The factor of the unit for numbers of so many digits, with guard digits of π."""
         with working_precision(4 * digits + 64):
             return self.size * midpoint(arb.pi()) if self.turning else self.size
 
@@ -98,9 +98,9 @@ class Unit:
 class Header:
     """The quantities in the columns of a table.
 
-    time: the place of t; None where absent.  places: by the name of the quantity, those of its components, by
-    their names, in the order in which they stand.  angles: degrees or radians, where it says so.  others: not read.
-    units: of t and of quantities, where they are not those of the data.
+    time: the index of t; None where absent.  places: by quantity, the index of each component by its name, in the order
+    of the file.  angles: degrees or radians, where the header says so.  others: columns that are not read.
+    units: of t and of quantities, where they differ from those of the data.
     """
 
     time: int | None
@@ -110,7 +110,7 @@ class Header:
     units: Mapping[str, Unit] = field(default_factory=dict)
 
     def of_state(self) -> dict[str, int]:
-        """The places of t, omega1 to omega3, gamma1 to gamma3, as far as they are there; InputError for one twice."""
+        """The indices of t, omega1 to omega3, gamma1 to gamma3 that are present; InputError for one given twice."""
         indices = {} if self.time is None else {"t": self.time}
         for quantity, name in (("omega", "omega"), ("framed", "omega"), ("gamma", "gamma")):
             components = self.places.get(quantity, {})
@@ -124,7 +124,7 @@ class Header:
 
 
 def header(names: Sequence[str], joint: str = "") -> Header:
-    """The meaning of every column; raises InputError for one that stands twice.
+    """The header of these names; raises InputError for a column that is given twice.
 
     joint: of columns qpos and qvel, "free" or "ball".
     """
@@ -150,8 +150,8 @@ def header(names: Sequence[str], joint: str = "") -> Header:
         quantity, component = meaning
         if component in indices.setdefault(quantity, {}):
             of_state = quantity in ("omega", "gamma")
-            said = f"{quantity}{_AXES.get(component, component)}" if of_state else quoted(name)
-            raise InputError(f"The column {said} stands twice.", "Give each column once.")
+            label = f"{quantity}{_AXES.get(component, component)}" if of_state else quoted(name)
+            raise InputError(f"The column {label} stands twice.", "Give each column once.")
         indices[quantity][component] = index
         units.setdefault(quantity, set()).add(_unit(quantity, name))
         if quantity == "euler" and (unit := _UNIT.search(name.strip())):
@@ -166,9 +166,9 @@ def header(names: Sequence[str], joint: str = "") -> Header:
 
 
 def _quaternion(names: Sequence[str], plain: Sequence[str]) -> dict[str, int]:
-    """The places of w, x, y, z or e0 to e3 beside each other, where no column is called one of a quaternion.
+    """The indices of adjacent w, x, y, z or e0 to e3, where no column is named as one of a quaternion.
 
-    Lengths are none.  Raises InputError where x, y, z may belong to either of two, as in x,y,z,w,x,y,z.
+    Columns with a unit of length are excluded.  Raises InputError where x, y, z may belong to either of two.
     """
     if any(meaning is not None and meaning[0] == "quaternion" for meaning in map(_meaning, plain)):
         return {}
@@ -184,10 +184,10 @@ def _quaternion(names: Sequence[str], plain: Sequence[str]) -> dict[str, int]:
 
 
 def _require_no_quantity(name: str, indices: Mapping[str, object]) -> None:
-    """Raises InputError for a column that is not read, called as one of a quantity that no other column gives.
+    """Raises InputError for an unread column whose name begins as that of a quantity that no other column gives.
 
-    So of a unit that does not stand in brackets: the quantity would be passed over.  What stands behind ``_`` makes
-    another quantity of all but Ω and γ, as in theta_dot.
+    Such is a unit without brackets: the quantity would be ignored.  A suffix after ``_`` makes another quantity, as in
+    theta_dot, except of Ω and γ.
     """
     parts = re.split(r"([\s_{}<>]+)", name.strip())
     for end in range(1, len(parts), 2):
@@ -202,7 +202,7 @@ def _require_no_quantity(name: str, indices: Mapping[str, object]) -> None:
 
 
 def _unit(quantity: str, name: str) -> Unit:
-    """The unit of a column; that of the data where it says none that is known."""
+    """The unit in the name of a column; that of the data where there is no known one."""
     match = _SAID.search(name.strip())
     text = unicodedata.normalize("NFKC", (match[1] or match[2] or "") if match else "").lower()
     text = re.sub(r"[\s*·^().]", "", text.replace("−", "-"))
@@ -212,16 +212,18 @@ def _unit(quantity: str, name: str) -> Unit:
 
 def _in_one_unit(units: Mapping[str, set[Unit]]) -> dict[str, Unit]:
     """The unit of each quantity that has another than the data; raises InputError for one that has several."""
-    for quantity, said in units.items():
-        if len({(unit.size, unit.turning) for unit in said}) > 1:
-            names = " and ".join(sorted(f"in {unit.name}" if unit.name else "without a unit" for unit in said))
+    for quantity, of_quantity in units.items():
+        if len({(unit.size, unit.turning) for unit in of_quantity}) > 1:
+            names = " and ".join(sorted(f"in {unit.name}" if unit.name else "without a unit" for unit in of_quantity))
             raise InputError(f"The header has the {_words(quantity)} {names}.", "Give all of it in one unit.")
-    unit_of_quantity = {quantity: min(said, key=lambda unit: unit.name) for quantity, said in units.items()}
+    unit_of_quantity = {
+        quantity: min(of_quantity, key=lambda unit: unit.name) for quantity, of_quantity in units.items()
+    }
     return {quantity: unit for quantity, unit in unit_of_quantity.items() if unit.size != 1}
 
 
 def _with_index(name: str) -> str:
-    """omega1 of ``omega[1]`` and R11 of ``R[1][1]`` or ``R(1, 1)``: what is in brackets is a component, not a unit."""
+    """omega1 of ``omega[1]`` and R11 of ``R[1][1]`` or ``R(1, 1)``, where the brackets hold a component, not a unit."""
     match = _INDEXED.fullmatch(name)
     base = _plain(match[1]) if match else ""
     if match is None or base in _TIME or (base not in _CLASSIC and _meaning(base) is not None):
@@ -246,7 +248,7 @@ def _meaning(plain: str) -> tuple[str, str] | None:
 
 
 def is_more_than_states(header: Header) -> bool:
-    """Whether there are other columns than Ω and γ, or one of these vectors alone."""
+    """Whether there are columns other than Ω and γ, or only one of these vectors."""
     names = set(header.places)
     quantities = {"omega" if name == "framed" else name for name in names}
     complete = all(len(components) == 3 for components in header.places.values())
@@ -256,17 +258,17 @@ def is_more_than_states(header: Header) -> bool:
 def ordered_places(
     quantity: str, components: Mapping[str, int], scalar_last: bool, sequence: str
 ) -> list[tuple[str, int]]:
-    """Name and place of each component in the order of the quantity; raises InputError for one that is missing."""
-    wanted = _wanted(quantity, set(components), scalar_last, sequence)
-    missing = [name for name in wanted if name not in components]
-    extra = [name for name in components if name not in wanted]
+    """Name and index of each component in the order of the quantity; raises InputError for a missing one."""
+    names = _components(quantity, set(components), scalar_last, sequence)
+    missing = [name for name in names if name not in components]
+    extra = [name for name in components if name not in names]
     if missing or extra:
-        said = f"component {missing[0]} is missing" if missing else f"component {extra[0]} belongs to no other"
-        raise InputError(f"The columns of the {_words(quantity)} are not complete: {said}.", REMEDY)
-    return [(name, components[name]) for name in wanted]
+        fault = f"component {missing[0]} is missing" if missing else f"component {extra[0]} belongs to no other"
+        raise InputError(f"The columns of the {_words(quantity)} are not complete: {fault}.", REMEDY)
+    return [(name, components[name]) for name in names]
 
 
-def _wanted(quantity: str, there: set[str], scalar_last: bool, sequence: str) -> list[str]:
+def _components(quantity: str, there: set[str], scalar_last: bool, sequence: str) -> list[str]:
     if quantity == "quaternion":
         if there & set("wxyz"):
             return list("xyzw" if scalar_last else "wxyz")
@@ -303,7 +305,7 @@ def cell(text: str, where: str) -> Fraction | None:
     return written_numbers.number(text, where)
 
 
-# Files with attitudes, positions or Ω in any axes, or the data of a body: read as the columns that they have.
+# Quantities of files with attitudes, positions or Ω in any axes, or with the data of a body.
 
 
 CONVENTIONS = ("quaternion_order", "quaternion", "matrix", "sequence", "angles", "frame", "up", "pivot", "point")
@@ -333,10 +335,10 @@ _ORDERS = {
 
 @dataclass(frozen=True, slots=True)
 class ColumnTable:
-    """Columns as they were read.
+    """Numbers of the columns of a file.
 
     values: by the name of the quantity, the exact numbers of each row, None for a row that is not finite.
-    texts: every number as it was written.  places: what each row is called in messages.
+    texts: every number as written.  places: the name of each row in messages.
     """
 
     values: Mapping[str, list[tuple[Fraction, ...] | None]]
@@ -345,31 +347,31 @@ class ColumnTable:
 
 
 def is_observed(document: Mapping[str, Any]) -> bool:
-    """Whether a document has more than Ω and γ of a top in principal axes."""
+    """Whether a document has other keys or columns than those of states in principal axes."""
     return "header" in document or any(document.get(key) is not None for key in KEYS)
 
 
 def convention(document: Mapping[str, Any], header: Header | None = None) -> Convention:
     """Conventions that the file states; raises InputError for what is not known."""
-    said: dict[str, Any] = {}
+    stated: dict[str, Any] = {}
     if (order := _word(document, "quaternion_order")) is not None:
         if order.lower() not in _ORDERS:
             raise InputError(f"quaternion_order = {quoted(order)} is not known.", "Use wxyz or xyzw.")
-        said["quaternion_order"] = _ORDERS[order.lower()]
+        stated["quaternion_order"] = _ORDERS[order.lower()]
     for key in ("quaternion", "matrix"):
         if _is_direction(document.get(key)):
-            said[key] = document[key].strip()
+            stated[key] = document[key].strip()
     for key in ("sequence", "angles", "up"):
         if (word := _word(document, key)) is not None:
-            said[key] = word.upper() if key == "sequence" else word.lower().lstrip("+")
-    if header is not None and header.angles and said.setdefault("angles", header.angles) != header.angles:
+            stated[key] = word.upper() if key == "sequence" else word.lower().lstrip("+")
+    if header is not None and header.angles and stated.setdefault("angles", header.angles) != header.angles:
         raise InputError(
-            f"The header says {header.angles} and angles = {said['angles']}.", "Say the unit of angles once."
+            f"The header says {header.angles} and angles = {stated['angles']}.", "Say the unit of angles once."
         )
     for key in ("pivot", "point"):
         if document.get(key) is not None:
-            said[key] = vector(_numbers(document[key], key, 3), key)
-    return Convention(**said)
+            stated[key] = vector(_numbers(document[key], key, 3), key)
+    return Convention(**stated)
 
 
 def _is_direction(value: Any) -> bool:
@@ -409,16 +411,16 @@ def _numbers(values: Any, what: str, count: int) -> list[Fraction]:
     return [written_numbers.finite(value, f"a number of {what}") for value in listed(values, what, count)]
 
 
-def columns(document: Mapping[str, Any], said: Convention) -> ColumnTable:
+def columns(document: Mapping[str, Any], convention: Convention) -> ColumnTable:
     """The columns of a document, of a text table or of JSON.
 
     Raises InputError for incomplete columns, Euler angles without a sequence, and an unreadable cell, by its line and
     column.
     """
-    table = _of_table(document, said) if "header" in document else _of_lists(document, said)
+    table = _of_table(document, convention) if "header" in document else _of_lists(document, convention)
     if not table.values:
         raise InputError("There are no columns that fix something of the motion.", _REMEDY)
-    if "euler" in table.values and not said.sequence:
+    if "euler" in table.values and not convention.sequence:
         raise InputError(
             "There are Euler angles, and nothing says of which sequence.", 'Give sequence, such as "ZXZ" or "ZYX".'
         )
@@ -428,15 +430,15 @@ def columns(document: Mapping[str, Any], said: Convention) -> ColumnTable:
 _TO_QUATERNION = {"rodrigues": of_rodrigues, "rotation_vector": of_rotation_vector}
 
 
-def _of_table(document: Mapping[str, Any], said: Convention) -> ColumnTable:
+def _of_table(document: Mapping[str, Any], convention: Convention) -> ColumnTable:
     header, cells, lines = document["header"], document["cells"], document["lines"]
-    space, last = in_space(document), said.quaternion_order == "xyzw"
+    space, last = in_space(document), convention.quaternion_order == "xyzw"
     both = {"omega", "gamma"} <= header.places.keys()
     places: dict[str, list[tuple[str, int]]] = {}
     units: dict[str, Unit] = {}
     for quantity, components in header.places.items():
         try:
-            ordered = ordered_places(quantity, components, last, said.sequence)
+            ordered = ordered_places(quantity, components, last, convention.sequence)
         except InputError:
             if both and quantity not in ("omega", "gamma"):
                 continue  # a column of some other thing, beside a whole state
@@ -454,7 +456,7 @@ def _of_table(document: Mapping[str, Any], said: Convention) -> ColumnTable:
     named = {name: [(f"{prefixes.get(name, name)}{part}", place) for part, place in places[name]] for name in values}
     for number, row in zip(lines, cells, strict=True):
         for name in values:
-            values[name].append(_whole(cell(row[p], f"Line {number}, column {n}") for n, p in named[name]))
+            values[name].append(_complete(cell(row[p], f"Line {number}, column {n}") for n, p in named[name]))
     texts = [row[distance] for row in cells for name in values for _, distance in places[name]]
     for name, unit in units.items():
         values[name] = _times(unit.factor(max(map(len, texts), default=0)), values[name])
@@ -470,21 +472,21 @@ def _times(factor: Fraction, rows: Sequence[tuple[Fraction, ...] | None]) -> lis
     return [None if row is None else tuple(factor * value for value in row) for row in rows]
 
 
-def in_unit_of_body(table: ColumnTable, header: Header | None, said: Convention, centre: Vector) -> ColumnTable:
-    """The table with positions in the unit of the body: its data are in that of the header, such as mm, or in m.
+def in_unit_of_body(table: ColumnTable, header: Header | None, convention: Convention, centre: Vector) -> ColumnTable:
+    """The table with positions in the unit of the body: that of the header, such as mm, or m.
 
-    Whichever brings the first position nearer to the distance of the point from the fixed point.
+    It is the one in which the first position is nearer to the distance of the point from the fixed point.
     """
     unit = None if header is None else header.units.get("position")
     rows = table.values.get("position", [])
     first = next((row for row in rows if row is not None), None)
-    point = centre if said.point is None else said.point
+    point = centre if convention.point is None else convention.point
     distance = log10(dot(point, point))
     if unit is None or first is None or distance is None:
         return table
 
     def off(size: Fraction) -> float:
-        apart = [size * value - coordinate for value, coordinate in zip(first, said.pivot, strict=True)]
+        apart = [size * value - coordinate for value, coordinate in zip(first, convention.pivot, strict=True)]
         logarithm = log10(dot(apart, apart))
         return inf if logarithm is None else abs(logarithm - distance)
 
@@ -493,13 +495,13 @@ def in_unit_of_body(table: ColumnTable, header: Header | None, said: Convention,
     return replace(table, values={**table.values, "position": _times(unit.size, rows)})
 
 
-def _whole(values: Any) -> tuple[Fraction, ...] | None:
+def _complete(values: Any) -> tuple[Fraction, ...] | None:
     """The numbers of one sample; None where one is not finite."""
     numbers = tuple(values)
     return None if None in numbers else numbers
 
 
-def _of_lists(document: Mapping[str, Any], said: Convention) -> ColumnTable:
+def _of_lists(document: Mapping[str, Any], convention: Convention) -> ColumnTable:
     columns: dict[str, tuple[str, list[Any]]] = {}
     space = in_space(document)
     states = document.get("states")
@@ -525,13 +527,13 @@ def _of_lists(document: Mapping[str, Any], said: Convention) -> ColumnTable:
     for name in WIDTHS:
         if name in columns:
             key, rows = columns[name]
-            values[name] = [_whole(cell_of(v, f"{key}[{i}]") for v in row) for i, row in enumerate(rows)]
+            values[name] = [_complete(cell_of(v, f"{key}[{i}]") for v in row) for i, row in enumerate(rows)]
     texts = [str(value) for _, rows in columns.values() for row in rows for value in row]
     return ColumnTable(values, texts, [f"row {i + 1}" for i in range(max(counts.values(), default=0))])
 
 
 def cell_of(value: Any, where: str) -> Fraction | None:
-    """As :func:`heavytop.features.score.trajectories.columns.cell`, of a value of JSON."""
+    """The exact number of a value of JSON, as :func:`cell`."""
     if value is None:
         raise InputError(f"{where} has an empty place.", "Give every row all of its columns.")
     if not isinstance(value, str):
@@ -540,7 +542,7 @@ def cell_of(value: Any, where: str) -> Fraction | None:
 
 
 def _is_table(value: Any, name: str) -> bool:
-    """Whether a value is one list for each time, and not one for the start."""
+    """Whether a value is a list of rows, one for each time, and not the value at the start."""
     if not isinstance(value, list) or not value or not isinstance(value[0], list):
         return False
     return name != "matrix" or len(value[0]) == WIDTHS["matrix"] or (bool(value[0]) and isinstance(value[0][0], list))
@@ -557,11 +559,11 @@ def _flat(row: Any, width: int, what: str) -> list[Any]:
 
 
 def start(
-    document: Mapping[str, Any], table: ColumnTable, at_start: bool, said: Convention, free: bool = False
+    document: Mapping[str, Any], table: ColumnTable, at_start: bool, convention: Convention, free: bool = False
 ) -> RawStart:
-    """The start: by its keys, else by the row t = 0.  free: of a body without weight, Ω alone asks for no attitude.
+    """The start, from its keys or else from the row t = 0.  free: a body without weight may have no attitude.
 
-    Raises InputError where neither gives Ω and γ or an attitude, and where two say what differs.
+    Raises InputError where neither gives Ω and γ or an attitude, and where two keys contradict each other.
     """
     forms: dict[str, tuple[str, list[Fraction], bool]] = {}
     for name in ("quaternion", "matrix", "euler"):
@@ -571,9 +573,9 @@ def start(
                 continue
             if value is None or (key == name and _is_table(value, name)):
                 continue
-            forms[name] = key, *_attitude(value, name, key, said)
+            forms[name] = key, *_attitude(value, name, key, convention)
     gamma = document.get("gamma")
-    from_row, degrees = False, said.angles == "degrees"
+    from_row, degrees = False, convention.angles == "degrees"
     first = {name: rows[0] for name, rows in table.values.items()} if at_start else {}
     if len(forms) > 1:
         one, other = (key for key, *_ in list(forms.values())[:2])
@@ -595,7 +597,7 @@ def start(
         form, (_, values, degrees) = next(iter(forms.items()))
     else:
         form, values = "gamma", _numbers(gamma, "gamma", 3)
-    if form == "euler" and not said.sequence:
+    if form == "euler" and not convention.sequence:
         raise InputError("start_euler needs its sequence.", 'Give sequence, such as "ZXZ".')
     beside = _numbers(gamma, "gamma", 3) if forms and gamma is not None else None
     omega, space = _omega(document, first)
@@ -623,8 +625,8 @@ def _omega(document: Mapping[str, Any], first: Mapping[str, tuple[Fraction, ...]
     )
 
 
-def _attitude(value: Any, name: str, key: str, said: Convention) -> tuple[list[Fraction], bool]:
-    """The numbers of one attitude, and whether they are angles in degrees: as the file says, or written as 30deg."""
+def _attitude(value: Any, name: str, key: str, convention: Convention) -> tuple[list[Fraction], bool]:
+    """The numbers of one attitude, and whether they are angles in degrees, declared or written as 30deg."""
     if isinstance(value, str):
         value = value.replace(",", " ").split()
     values = _flat(value, WIDTHS[name], key)
@@ -633,7 +635,7 @@ def _attitude(value: Any, name: str, key: str, said: Convention) -> tuple[list[F
         raise InputError(f"{key} = {quoted(value)} mixes units.", "Give every angle as 30deg, or none.")
     with prefixed(key):
         part = [exact(value.strip().removesuffix("deg") if isinstance(value, str) else value) for value in values]
-    return part, name == "euler" and (any(marked) or said.angles == "degrees")
+    return part, name == "euler" and (any(marked) or convention.angles == "degrees")
 
 
 def times(document: Mapping[str, Any]) -> list[Fraction]:

@@ -1,4 +1,4 @@
-"""Trajectories that another program wrote, as JSON or CSV, read exactly and validated."""
+"""Trajectory files of other programs, in JSON, CSV and formats of logs, read exactly and validated."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ from heavytop.top.bodies import BODY, CENTRE, Body, body_of
 from heavytop.top.equations import NAMES, VARIABLES, System, system_of
 from heavytop.top.heavy_top import HeavyTop, State, check_times, require_physical
 
-# Tables of states that other programs write as text: separators, spellings of the header, comments.
+# Text tables of other programs: separators, header, comments.
 
 
 REMEDY = "`heavytop docs score` shows both forms of the file, `heavytop list --case lagrange` one to paste."
@@ -51,18 +51,18 @@ LISTS = (*VECTORS, "omega_space", "pivot", "point", "start_quaternion", "start_m
 """Keys whose values are lists of numbers."""
 _COMMENT = ("#", "%", "!", "//")
 _REMARK = re.compile(r"((?<!1\.)#|#(?!inf|ind|qnan|snan)).*", re.IGNORECASE)
-"""Remarks behind the numbers of a line: 1.#INF and 1.#QNAN are how an older C library writes infinity and NaN."""
+"""Remarks after the numbers of a line; an older C library writes infinity and NaN as 1.#INF and 1.#QNAN."""
 _STARTS = ("gamma", "start_quaternion", "start_matrix", "start_euler")
 _COMMA = re.compile(r",(?![^\[]*\])")
 """A comma, but for one in brackets, as in R[0,1]."""
 _ALL_COLUMNS = "Give every row all of its columns, with decimal points, not commas."
 _COUNTS = {"inertia": (3, 6, 9), "start_quaternion": (4,), "start_matrix": (9,)}
-"""Numbers of a key whose value is not a vector."""
+"""Counts of numbers of keys that are not vectors."""
 _DECIMAL_COMMAS = re.compile(r"(?!.*,\s).*(?<![^;\s])[-+]?\d+,\d+(?![^;\s])")
 """A number such as 2,5 between semicolons or spaces, where these and no commas separate."""
 _POINT = "Write a decimal point in each number, and commas or spaces between them."
 _LIKE = 0.75
-"""A key is a misspelling of another if so large a part of them is alike."""
+"""Similarity from which a key is a misspelling of another."""
 
 
 def unknown(key: str, known: Sequence[str]) -> InputError:
@@ -189,7 +189,7 @@ def _numbers(key: str, text: str) -> list[str]:
 
 
 def _parts(header: observed_columns.Header) -> list[int]:
-    """The places of quantities of which a component is missing, which beside a whole state are not read."""
+    """Indices of quantities with a missing component, which are not read if Ω and γ are complete."""
     if not {"omega", "gamma"} <= header.places.keys():
         return []
     parts = (part for name, part in header.places.items() if len(part) < WIDTHS.get(name, 3))
@@ -197,7 +197,7 @@ def _parts(header: observed_columns.Header) -> list[int]:
 
 
 def unread(names: Sequence[str], header: Sequence[str]) -> list[str]:
-    """Note on columns that are not read; nothing of ξ and radii, which heavytop writes itself."""
+    """The note on columns that are not read, except ξ and radii, which heavytop writes itself."""
     columns = {name.strip() for name in header}
     own = {"xi1", "xi2", "xi3"} | {f"{name}_radius" for name in columns}
     more = [name for name in names if name.strip() not in own]
@@ -253,13 +253,13 @@ def _split(body: list[str], lines: list[int], separator: str | None, width: int)
     return rows
 
 
-# Whether a trajectory file and the case that it is said to be of agree.
+# Agreement of a trajectory file with its case.
 
 _NONE: Vector = (Fraction(0), Fraction(0), Fraction(0))
 
 
 def require_case(case: Case, top: HeavyTop, start: State, which: System, at_start: State | None) -> None:
-    """Raises InputError where the file says something else than the case."""
+    """Raises InputError where file and case differ."""
     if which is not case.system:
         raise _other(case, "system", which.name, case.system.name)
     _require_alike(case, ("weight",), [top.weight], [case.top.weight])
@@ -488,7 +488,7 @@ def _times(document: dict[str, Any]) -> list[Fraction]:
 
 
 def _places(document: dict[str, Any], count: int) -> list[str]:
-    """Where each state stands: its line in a table, its row in JSON."""
+    """The place of each state in messages: its line in a table, its row in JSON."""
     return document.get("numbers") or [f"Row {number}" for number in range(1, count + 1)]
 
 
@@ -530,7 +530,7 @@ def _body(document: dict[str, Any], case: Case | None) -> AnyBody:
 
 
 def _top(document: dict[str, Any], case: Case | None) -> HeavyTop:
-    """The top of the file, or of the case as far as the file does not say."""
+    """The top of the file, with the data of the case where the file has none."""
     inertia, centre = (_vector(document, key, case) for key in ("inertia", "centre"))
     weight = _text(document, "weight", None if case is None else exact_text(case.top.weight))
     rotor = _list(document, "rotor", 3) if "rotor" in document else None if case is None else case.top.rotor

@@ -1,4 +1,4 @@
-"""Logs as robots, spacecraft and simulators write them, as the tables that this package reads.
+"""Logs of robots, spacecraft and simulators, converted to the tables that this package reads.
 
 TUM trajectories, exports of ROS, Foxglove and MuJoCo, attitude ephemeris messages (CCSDS 504.0-B, KVN), arrays of NumPy
 and Parquet.
@@ -26,10 +26,10 @@ TUM = ("timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
 KITTI = ("R11", "R12", "R13", "px", "R21", "R22", "R23", "py", "R31", "R32", "R33", "pz")
 _STAMP = re.compile(r"(?:.*[./_])?(?:stamp|time|clock)[./_](secs?|n(?:ano)?secs?)", re.IGNORECASE)
 _EPOCHS = ("timestamp", "stamp", "epoch")
-"""Columns of times that are counted from their first row."""
+"""Names of columns of times that are counted from their first row."""
 _COUNTED = (*_EPOCHS, "t", "time")
 _OF_BODY = r"(?:_(?:rs|s|b|ib|bn|body|local|imu))*"
-"""What may say, behind the name of an angular velocity, that it is of the body."""
+"""Suffixes of an angular velocity in body axes."""
 _ALIASES = tuple(
     (re.compile(rf"(?:.*[./_])?{pattern}", re.IGNORECASE), name)
     for pattern, name in (
@@ -48,7 +48,7 @@ _ALIASES = tuple(
     )
 )
 _JOINTS = {"free": (3, 3), "ball": (0, 0)}
-"""Where the quaternion stands in qpos of MuJoCo, and the angular velocity, of the body, in qvel."""
+"""Index of the quaternion in qpos of MuJoCo, and of the angular velocity in body axes in qvel."""
 _INDEX = re.compile(r"(qpos|qvel)[\[_(]?(\d+)[\])]?", re.IGNORECASE)
 _DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
 _LOOKS = {
@@ -61,10 +61,10 @@ _GIVES = {
 }
 _OTHER = re.compile(r"(?:.*[._])?(?:cov|err|std|sigma_(?!BN)|desired|target|cmd|ref|bias)|b_[wa]_", re.IGNORECASE)
 _WITH_UNIT = re.compile(r"(.*?)\s*([\[(](?!\s*[wxyz]\s*[\])])\s*(?:[^\[\]()\d][^\[\]()]*)?[\])])?")
-"""The name of a column, and the unit behind it in brackets, which may be empty."""
+"""The name of a column, and its unit in brackets, which may be empty."""
 _OF_FOUR = re.compile(r"(.*[^\s])([wxyz])", re.IGNORECASE)
 _EPOCH_UNITS = ((10**17, "ns"), (10**14, "us"), (10**11, "ms"))
-"""Times since 1970 that are as large as this are not in seconds."""
+"""Sizes of times since 1970 from which they are in these units."""
 
 
 def canonical(name: str, joint: str = "") -> str:
@@ -117,7 +117,7 @@ _TEN_DAYS = 864_000
 _OF_1970 = 10**9, 4 * 10**9
 """Seconds since 1970 in the years 2001 to 2096: no motion begins so long before its first row."""
 _LONG = 500
-"""Integers that are so far apart are hardly seconds: those of PX4 are microseconds since the start."""
+"""Integers so far apart are not taken for seconds: those of PX4 are microseconds since the start."""
 
 
 def with_one_time(
@@ -161,7 +161,7 @@ def with_one_time(
 
 
 def _places(word: str, words: Sequence[str], cells: Sequence[Sequence[str]]) -> list[int]:
-    """The place of a column of that name whose times are counted from the first row; t and time only if since 1970."""
+    """The index of a column of that name whose times are counted from the first row; t and time only if since 1970."""
     if word not in words:
         return []
     index = words.index(word)
@@ -170,7 +170,7 @@ def _places(word: str, words: Sequence[str], cells: Sequence[Sequence[str]]) -> 
 
 
 def _kept(stamps: Sequence[str]) -> str:
-    """What is left of the time where all stamps are doubles, whose digits the epoch takes; empty where none is lost."""
+    """The note on the digits lost to the epoch where all stamps are doubles; empty where none are."""
     values = [(value, _last_unit(text)) for text in stamps if (value := number(text)) is not None]
     unit, (first, _), (last, _) = min(unit for _, unit in values), values[0], values[-1]
     spacing = Fraction(math.ulp(float(first)))
@@ -181,12 +181,12 @@ def _kept(stamps: Sequence[str]) -> str:
 
 
 def number(text: str) -> Fraction | None:
-    """A decimal number; None for any other text, of which the reading of the column says what is wrong."""
+    """A decimal number; None for any other text, which is refused where the column is read."""
     return Fraction(text.strip()) if _DECIMAL.fullmatch(text.strip()) else None
 
 
 def is_unit(texts: Sequence[str]) -> bool:
-    """Whether four numbers are of length 1, to 1 %: those of a quaternion."""
+    """Whether four numbers have length 1 to 1 %, as a quaternion."""
     values = [number(text) for text in texts]
     return None not in values and abs(sum(float(value or 0) ** 2 for value in values) - 1) < 0.02
 
@@ -194,7 +194,7 @@ def is_unit(texts: Sequence[str]) -> bool:
 def without_repeats(
     times: Sequence[Fraction], rows: list[list[str]], lines: Sequence[int]
 ) -> tuple[list[int], list[str], str]:
-    """Which rows are kept, notes, and where the time goes back: of rows that repeat one the first; none behind that.
+    """Indices of the rows to keep, notes, and where the time goes back: repeated rows and all later ones are dropped.
 
     Raises InputError for two rows at one time that differ.
     """
@@ -218,7 +218,7 @@ def without_repeats(
 
 
 def _agree(one: str, other: str) -> bool:
-    """Whether two texts are one number to the digits printed of the shorter."""
+    """Whether two texts are one number to the digits of the shorter."""
     a, b = number(one), number(other)
     if one == other or a is None or b is None:
         return one == other
@@ -376,7 +376,7 @@ def _of_numpy(content: bytes) -> dict[str, Any]:
 
 
 def _of_parquet(content: bytes) -> dict[str, Any]:
-    """Its columns, also of lists and of instants, and its metadata."""
+    """Columns of a Parquet file, also of lists and of instants, and its metadata."""
     require_extra("parquet")
     import pyarrow
     import pyarrow.parquet

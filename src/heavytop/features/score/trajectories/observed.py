@@ -1,4 +1,4 @@
-"""Trajectories with attitudes, positions or Ω in any axes, as they are scored: from a document or from arrays."""
+"""Trajectories as they are scored, from a document or from arrays: states, attitudes, positions, Ω in any axes."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ from heavytop.top.heavy_top import HeavyTop, State, require_physical
 
 # Bodies of trajectory files: rounded to a format, in principal axes, and in double.
 #
-# A body whose principal axes are irrational is turned by a rational rotation next to them, exact to 160 bits more than
-# the format has: what is left of its tensor is that much below what the format can show.
+# Irrational principal axes are replaced by a rational rotation near them, to 160 bits more than the format has: the
+# products of inertia that remain are that much below the resolution of the format.
 
 
 AnyBody = HeavyTop | Body
@@ -50,7 +50,7 @@ def _triple(values: Sequence[Fraction]) -> Vector:
 
 
 def rounded_body(body: AnyBody, precision: Precision) -> AnyBody:
-    """The body with every number that was given rounded to the format."""
+    """The body with each of its given numbers rounded to the format."""
 
     def near(values: Sequence[Fraction]) -> Vector:
         return _triple([round_to(value, precision.bits) for value in values])
@@ -88,13 +88,13 @@ def in_principal_axes(body: AnyBody, bits: int) -> tuple[HeavyTop, Tensor]:
 
 
 _SLACK = 8
-"""A quaternion or a matrix may be off by so many bits of rounding."""
+"""Bits of rounding by which a quaternion or a matrix may be off."""
 _ROW_SLACK = Fraction(1, 100)
-"""A start read from a row t = 0 is written with the digits of the other rows."""
+"""Tolerance of a start read from a row t = 0: it has the digits of the other rows."""
 _FAR = Fraction(1, 10)
-"""A row whose quaternion or matrix is off by more is refused."""
+"""Tolerance of the quaternion or matrix of a row."""
 _IRRATIONAL_BITS = 1200
-"""Of an attitude whose entries are irrational, before it is rounded to the format."""
+"""Precision of an attitude with irrational entries, before it is rounded to the format."""
 
 Rows = tuple[Vector, Vector, Vector]
 
@@ -103,9 +103,9 @@ Rows = tuple[Vector, Vector, Vector]
 class RawStart:
     """The start as the file gives it.
 
-    form: of ``values``: quaternion, matrix, euler, gamma; or plain, R from body to space whatever matrices are.
-    omega: in body axes, or in those of space.
-    gamma: given beside an attitude.  from_row: whether it is the row t = 0.  degrees: of angles.
+    form: of ``values``: quaternion, matrix, euler, gamma; or plain, R from body to space in any convention of matrices.
+    omega: in body axes, or in those of space where ``in_space``.
+    gamma: given with an attitude.  from_row: whether it is the row t = 0.  degrees: the unit of angles.
     """
 
     form: str
@@ -119,19 +119,18 @@ class RawStart:
     def rounded(self, precision: Precision) -> RawStart:
         """These quantities in numbers of a format."""
 
-        def both(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
+        def rounded(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
             return tuple(round_to(value, precision.bits) for value in values)
 
-        a, b, c = both(self.omega)
-        return replace(self, values=both(self.values), omega=(a, b, c))
+        a, b, c = rounded(self.omega)
+        return replace(self, values=rounded(self.values), omega=(a, b, c))
 
 
-def rotation(raw: RawStart, said: Convention, precision: Precision, normalize: bool) -> Rows:
+def rotation(raw: RawStart, convention: Convention, precision: Precision, normalize: bool) -> Rows:
     """R in canonical axes of space, exactly orthogonal: three rows ξ, η, γ of exact numbers.
 
-    normalize: take the rotation nearest to what is given, however far off it is.
-    Raises InputError for a quaternion off length 1, a matrix that is not a rotation, and a γ beside it that is
-    not its third row.
+    normalize: take the nearest rotation, however far it is.
+    Raises InputError for a quaternion off length 1, a matrix that is not a rotation, and a γ that is not its third row.
     """
     slack = _ROW_SLACK if raw.from_row else 2**_SLACK * precision.eps
     if raw.form == "gamma":
@@ -141,10 +140,10 @@ def rotation(raw: RawStart, said: Convention, precision: Precision, normalize: b
         require_rotation(raw.form, raw.values, slack, f"The {raw.form} of {where}")
     if raw.form == "quaternion":
         require_direction(raw.values, f"The quaternion of {where}")
-        rows: Any = said.rotation("quaternion", raw.values, None)
+        rows: Any = convention.rotation("quaternion", raw.values, None)
     else:
-        rows = _orthogonal(raw, said, precision)
-    rotations = [tuple(row) for row in said.upright(rows)]
+        rows = _orthogonal(raw, convention, precision)
+    rotations = [tuple(row) for row in convention.upright(rows)]
     if raw.gamma is not None:
         off = max(abs(a - b) for a, b in zip(raw.gamma, rotations[2], strict=True))
         if off > max(slack, Fraction(1, 10**6)):
@@ -170,12 +169,14 @@ def _of_gamma(raw: RawStart, slack: Fraction, normalize: bool) -> Rows:
     return xi, (a, b, c), gamma
 
 
-def _orthogonal(raw: RawStart, said: Convention, precision: Precision) -> Rows:
-    """R of a matrix that is off by roundings, or of angles: of the quaternion next to it, so that it is orthogonal."""
+def _orthogonal(raw: RawStart, convention: Convention, precision: Precision) -> Rows:
+    """R, exactly orthogonal, near a rounded matrix or of angles."""
     if raw.form == "euler":
         angles = tuple(Angle(value, raw.degrees) for value in raw.values)
-        return Attitude("euler", angles=angles, sequence=said.sequence).rational_rows(precision.bits + _SPARE_BITS)
-    plain = replace(said, matrix="body_to_space") if raw.form == "plain" else said
+        return Attitude("euler", angles=angles, sequence=convention.sequence).rational_rows(
+            precision.bits + _SPARE_BITS
+        )
+    plain = replace(convention, matrix="body_to_space") if raw.form == "plain" else convention
     return rotation_of(multiple_of_quaternion(plain.rotation("matrix", raw.values, None)))
 
 
@@ -225,26 +226,26 @@ def raw_start(start: State) -> RawStart:
     return RawStart("plain", tuple(entry for row in rows for entry in row), omega, space)
 
 
-# A trajectory that another program computed, as it is scored: exact times, states rounded to its format.
+# Trajectories of other programs: exact times, states rounded to the format.
 
 
 LONGEST_NAME = 200
 _ODD_GAMMA = Fraction(1, 10)
-"""A state whose |γ|² is off 1 by more is not rounding, and seldom a method."""
+"""Distance of |γ|² from 1 that neither rounding nor, in general, a method explains."""
 _FITS_ANYWHERE = 1 << 1023
-"""Every format holds numbers below that."""
+"""Every format represents numbers below that."""
 
 
 @dataclass(frozen=True, slots=True)
 class GivenTrajectory:
-    """A trajectory as it was given.
+    """A trajectory of another program.
 
     times: exact, as written.  states: six exact numbers each, rounded to the format; None for a state that is not
-    finite.  name, integrator: as the row will call them.  flags: what else the file says.  sha256: of the file.
-    format_guessed: whether the format was read off the digits written.  notes: what reading the file took for granted.
+    finite.  name, integrator: of the row.  flags: further keys of the file.  sha256: of the file.
+    format_guessed: whether the format was inferred from the digits.  notes: assumptions made in reading the file.
     cut: why later rows of the file are not scored; empty where all are.
-    observed: what it gives in place of Ω and γ in principal axes; the states are then all numbers of a row, and top and
-    start are those in principal axes.
+    observed: the quantities in place of Ω and γ in principal axes; the states are then all numbers of a row, and top
+    and start are in principal axes.
     """
 
     name: str
@@ -266,7 +267,7 @@ class GivenTrajectory:
 
     @property
     def step(self) -> Fraction | None:
-        """That of the method, where the file says it in a number."""
+        """The step of the method, where the file gives it as a number."""
         try:
             step = exact(self.flags.get("step", "0"))
         except InputError:
@@ -274,7 +275,7 @@ class GivenTrajectory:
         return step if step > 0 else None
 
     def warnings(self) -> list[str]:
-        """Data that no rigid body can have, and γ so far off the unit sphere that columns may be in another order."""
+        """Warnings of data that no rigid body has, and of γ that suggests another order of the columns."""
         if self.observed is not None:
             return [*self.notes, *self.observed.body.warnings()]
         sentences = [*self.notes, *self.top.warnings()]
@@ -336,7 +337,7 @@ def named(text: str, what: str) -> str:
 
 
 def rounded_state(values: list[Fraction | None], precision: Precision) -> tuple[Fraction, ...] | None:
-    """The numbers rounded to the format; None where one is not finite there, as 1e400 in double."""
+    """The numbers rounded to the format; None where one is not finite in it, as 1e400 in double."""
     numbers = tuple(round_to(value, precision.bits) for value in values if value is not None)
     finite = len(numbers) == len(values) and all(_fits(value, precision) for value in numbers)
     return numbers if finite else None
@@ -361,12 +362,12 @@ class Observed:
     """Quantities that a trajectory has in place of Ω and γ in principal axes.
 
     columns: by the name of the quantity, the rounded numbers of each sample up to the first that is not finite.
-    said: their conventions.  posed: the body and its start, rounded to the format and exact from there.
-    body, start: the same as they were given, for suppositions.
+    convention: of these columns.  posed: the body and its start in principal axes, rounded to the format before.
+    body, start: both in the axes of the file, for the diagnosis.
     """
 
     columns: Mapping[str, list[tuple[Fraction, ...]]]
-    said: Convention
+    convention: Convention
     posed: Posed
     body: AnyBody
     start: RawStart
@@ -380,22 +381,22 @@ class Observed:
         """The numbers of one row."""
         return {name: rows[row] for name, rows in self.columns.items()}
 
-    def seen(self, times: Sequence[Fraction]) -> Observations | None:
+    def observations(self, times: Sequence[Fraction]) -> Observations | None:
         """The samples in double; None where no double holds them."""
         try:
             columns = {name: numpy.array(rows, dtype=float) for name, rows in self.columns.items()}
-            body, point = body_data(self.body), self.said.point
-            pivot, start = floats(self.said.pivot), _start(self.start, self.posed)
+            body, point = body_data(self.body), self.convention.point
+            pivot, start = floats(self.convention.pivot), _start(self.start, self.posed)
         except OverflowError:
             return None
         if not all(numpy.isfinite(values).all() for values in columns.values()):
             return None
         of = body.centre if point is None else floats(point)
         count = min(map(len, columns.values()), default=0)
-        said = Reading.of(self.said)
-        if self.start.form == "euler" and self.start.degrees != said.degrees and "euler" not in columns:
-            said = replace(said, degrees=self.start.degrees)
-        return Observations(tuple(times[:count]), columns, body, start, said, of, pivot) if count else None
+        reading = Reading.of(self.convention)
+        if self.start.form == "euler" and self.start.degrees != reading.degrees and "euler" not in columns:
+            reading = replace(reading, degrees=self.start.degrees)
+        return Observations(tuple(times[:count]), columns, body, start, reading, of, pivot) if count else None
 
 
 def _start(raw: RawStart, posed: Posed) -> GivenStart:
@@ -408,13 +409,13 @@ def _start(raw: RawStart, posed: Posed) -> GivenStart:
 
 
 def posed(
-    body: AnyBody, raw: RawStart, said: Convention, precision: Precision, normalize: bool
+    body: AnyBody, raw: RawStart, convention: Convention, precision: Precision, normalize: bool
 ) -> tuple[AnyBody, RawStart, Posed]:
     """Body and start rounded to the format, and both in principal axes."""
     body, start = rounded_body(body, precision), raw.rounded(precision)
     top, axes = in_principal_axes(body, precision.bits + _SPARE_BITS)
-    rows = rotation(start, said, precision, normalize)
-    omega = space_to_body(rows, said.upright(start.omega)) if start.in_space else start.omega
+    rows = rotation(start, convention, precision, normalize)
+    omega = space_to_body(rows, convention.upright(start.omega)) if start.in_space else start.omega
     in_principal = [space_to_body(axes, v) for v in (omega, rows[2], rows[0])]
     w, gamma, xi = (_triple(v) for v in in_principal)
     return body, start, Posed(top, State(w, gamma), xi, axes, body.centre)
@@ -423,7 +424,7 @@ def posed(
 def observed(
     body: AnyBody,
     raw: RawStart,
-    said: Convention,
+    convention: Convention,
     values: Mapping[str, Sequence[tuple[Fraction, ...] | None]],
     places: Sequence[str],
     precision: Precision,
@@ -445,12 +446,12 @@ def observed(
     done = next((i for i, row in enumerate(rows) if row is None), len(rows))
     columns = {name: [row for row in part[:done] if row is not None] for name, part in rounded.items()}
     if normalize:
-        columns = {name: _normalized(name, part, said) for name, part in columns.items()}
-    body, start, observed = posed(body, raw, said, precision, normalize)
-    return Observed(columns, said, observed, body, start), rows
+        columns = {name: _normalized(name, part) for name, part in columns.items()}
+    body, start, observed = posed(body, raw, convention, precision, normalize)
+    return Observed(columns, convention, observed, body, start), rows
 
 
-def _normalized(name: str, rows: list[tuple[Fraction, ...]], said: Convention) -> list[tuple[Fraction, ...]]:
+def _normalized(name: str, rows: list[tuple[Fraction, ...]]) -> list[tuple[Fraction, ...]]:
     """Quaternions of length 1 but for a rounding in 128 bits, and the rotations next to matrices."""
     if name == "quaternion":
         return [unit(row) for row in rows]
@@ -472,7 +473,7 @@ def unit(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
 def of_observed_arrays(
     body: AnyBody,
     raw: RawStart,
-    said: Convention,
+    convention: Convention,
     times: list[Fraction],
     arrays: Mapping[str, list[list[Any]]],
     precision: Precision | None,
@@ -491,7 +492,7 @@ def of_observed_arrays(
     form = precision or written_numbers.of_bits(max(bits_of(value) for value in numbers))
     values = {name: [_row(row, f"{name}[{i}]") for i, row in enumerate(rows)] for name, rows in arrays.items()}
     places = [f"row {i}" for i in range(len(times))]
-    quantities, states = observed(body, raw, said, values, places, form, normalize)
+    quantities, states = observed(body, raw, convention, values, places, form, normalize)
     require_physical(quantities.posed.top, quantities.posed.start)
     top, start, which = quantities.posed.top, quantities.posed.start, system_of(None, body)
     own = GivenTrajectory(*_names(*names), top, start, which, form, times, states, _outcome(states), 0, {})
