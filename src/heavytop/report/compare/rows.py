@@ -232,6 +232,8 @@ def judge_series(old: Series, new: Series, allowed: float, floor: float, exactly
         off = any(abs(b - a) > most for a, b in values)
         return (Verdict.WORSE, "a value that must agree does not") if off else SAME
     sizes = [log_sizes(tuple(texts)) for texts in (before, after)]
+    if max(sizes[1]) <= max(floor, min(sizes[0])):
+        return SAME
     if min(map(min, sizes)) < floor:
         sizes = [[max(size, floor) for size in part] for part in sizes]
     grown = median(map(sub, sizes[1], sizes[0]))
@@ -491,7 +493,7 @@ class RowComparison:
         """Findings of series that changed: an equal one is not a finding."""
         if old.series is new.series:
             return
-        summed = _by_series(old), _by_series(new)
+        summed = _by_series(old)
         for name, series in old.series.items():
             limits = self.limits(old, f"series {name}")
             match = new.series.get(name)
@@ -501,12 +503,13 @@ class RowComparison:
                 before = f"{len(series.values)} samples kept"
                 yield Finding(key, name, Verdict.MISSING, before, None, "it is missing", "series")
                 continue
-            metrics, matches = (by_name.get(name, {}) for by_name in summed)
+            metrics = summed.get(name, {})
             exactly = any(metric.kind == "value" for part in ("max", "final") for metric in metrics.get(part, ()))
             allowed = limits.value if exactly else max(limits.loss, self._noise(metrics, old, limits))
             floor = limits.floor + self._eps(series.quantity, old)
             judged = judge_series(series, match, allowed, floor, exactly)
             if judged[0] is Verdict.WORSE and not exactly and limits.noise:
+                matches = _by_series(new).get(name, {})
                 largest = list(zip(metrics.get("max", ()), matches.get("max", ()), strict=False))
                 if largest and all(self._is_by_rounding(*pair, old) for pair in largest):
                     judged = judge_series(series, match, math.inf, floor, exactly)
