@@ -230,7 +230,7 @@ class Angle:
 
 @dataclass(frozen=True, slots=True)
 class Attitude:
-    """An attitude as it was given, exactly; made by one of the four constructors.
+    """An exact attitude, made by one of the constructors.
 
     kind: quaternion, matrix, euler or axis_angle.  numbers: as given, row by row.  angles: of euler and axis_angle.
     """
@@ -472,7 +472,7 @@ def unwrap(angles: Iterable[Any], turn: Any) -> list[Any]:
 
 
 def perpendicular(gamma: Vector) -> Vector:
-    """An exact rational unit vector ⟂ γ (|γ| = 1 exactly): where an attitude that nobody gave starts.
+    """An exact rational unit vector ⟂ γ (|γ| = 1 exactly): the initial ξ where no attitude is given.
 
     The image of e1 under the reflection that takes e3 to γ; e1 itself for γ = e3.
     """
@@ -483,11 +483,11 @@ def perpendicular(gamma: Vector) -> Vector:
     return 1 - factor * v[0], -factor * v[1], -factor * v[2]
 
 
-# What is told of an attitude: quaternion, matrix, Euler angles, the position of a point, Ω in space axes.
+# Outputs of an attitude: quaternion, matrix, Euler angles, the position of a point, Ω in space axes.
 #
-# Each is a function of a state (Ω, γ) and of ξ over any ring; the conventions are those
-# above. A point p of the body, in body axes, stands at pivot + R p in space: the fixed point is
-# the origin unless a pivot is given, and p is the centre of mass unless a point is given.
+# Each is a function of a state (Ω, γ) and of ξ over any ring, in the conventions above.  A point p of the body, in body
+# axes, is at pivot + R p in space: the fixed point is the origin unless a pivot is given, and p is the centre of mass
+# unless a point is given.
 
 
 SHAPES: dict[str, tuple[int, ...]] = {
@@ -568,7 +568,7 @@ class Output:
         return tuple(a + b for a, b in zip(shift, rotated(rows, point), strict=True))
 
     def point_of(self, centre: Vector) -> Vector:
-        """The point whose position is told."""
+        """The point whose position is computed."""
         return centre if self.point is None else self.point
 
 

@@ -42,11 +42,11 @@ from heavytop.top.inertia_slips import (
     steiner,
 )
 
-# Principal axes of a symmetric tensor: exact where they are rational, else a rational rotation all but theirs.
+# Principal axes of a symmetric tensor: exact where they are rational, else a rational rotation near them.
 #
 # A is a rotation in exact rationals whose columns are the principal axes, v_given = A v_principal.  Where the axes are
-# irrational Aᵀ J A keeps entries off its diagonal, of some 2^-bits relative to the largest: what is left of the tensor
-# is known exactly, and so is what a motion in these axes lacks.
+# irrational Aᵀ J A keeps entries off its diagonal, of some 2^-bits relative to the largest: this remainder is known
+# exactly, and so is the error of a motion in these axes.
 
 
 IDENTITY: tuple[Vector, Vector, Vector] = tuple(tuple(Fraction(i == j) for j in range(3)) for i in range(3))  # type: ignore[assignment]
@@ -69,7 +69,7 @@ class PrincipalAxes:
 
     @property
     def exact(self) -> bool:
-        """Whether these are the principal axes, with no rest."""
+        """Whether these are the principal axes, without a remainder."""
         return not any(value for row in self.left for value in row)
 
 
@@ -80,7 +80,7 @@ def principal_axes(tensor: Rows[Fraction], bits: int) -> PrincipalAxes:
     smallest moment.  Raises InputError where moments of a tensor that is not diagonal differ by a factor above 1e300.
     """
     if not any(tensor[i][j] for i in range(3) for j in range(i)):
-        return _with_rest(tensor, IDENTITY, (tensor[0][0], tensor[1][1], tensor[2][2]))
+        return _with_remainder(tensor, IDENTITY)
     bits += _spread(tensor)
     near = _near(tensor, bits)
     axes = _rational(tensor, near)
@@ -88,12 +88,15 @@ def principal_axes(tensor: Rows[Fraction], bits: int) -> PrincipalAxes:
         return axes
     turned = multiplied(transposed(near), multiplied(tensor, near))
     first, second, third = (round_to(turned[i][i], bits + _GUARD_BITS) for i in range(3))
-    return _with_rest(tensor, near, _exact_moments(tensor, (first, second, third)))
+    return _with_remainder(tensor, near, _exact_moments(tensor, (first, second, third)))
 
 
-def _with_rest(tensor: Rows[Fraction], axes: Tensor, moments: Vector) -> PrincipalAxes:
-    turned = multiplied(transposed(axes), multiplied(tensor, axes))
-    return PrincipalAxes(axes, moments, _less(turned, moments))
+def _with_remainder(tensor: Rows[Fraction], axes: Tensor, moments: Vector | None = None) -> PrincipalAxes:
+    """The principal axes with their remainder; moments: None for the diagonal in these axes."""
+    rotated_tensor = multiplied(transposed(axes), multiplied(tensor, axes))
+    (first, _, _), (_, second, _), (_, _, third) = rotated_tensor
+    moments = moments or (first, second, third)
+    return PrincipalAxes(axes, moments, _less(rotated_tensor, moments))
 
 
 def _spread(tensor: Rows[Fraction]) -> int:
@@ -121,7 +124,7 @@ def _less(tensor: Rows[Fraction], moments: Sequence[Fraction]) -> Three[Vector]:
 
 
 def _exact_moments(tensor: Rows[Fraction], near: Vector) -> Vector:
-    """Each moment that is rational in place of the number near it: over the common denominator it is an integer."""
+    """Each rational moment in place of the number near it: over the common denominator it is an integer."""
     common = lcm(*(value.denominator for row in tensor for value in row))
     moments = []
     for value in near:
@@ -148,9 +151,7 @@ def _rational(tensor: Rows[Fraction], near: Rows[Fraction]) -> PrincipalAxes | N
     columns = [v if dot(v, u) >= 0 else (-v[0], -v[1], -v[2]) for v, u in zip(columns, transposed(near), strict=True)]
     if determinant(columns) < 0:
         columns[2] = (-columns[2][0], -columns[2][1], -columns[2][2])
-    axes = transposed(columns)
-    turned = multiplied(transposed(axes), multiplied(tensor, axes))
-    return _with_rest(tensor, axes, (turned[0][0], turned[1][1], turned[2][2]))
+    return _with_remainder(tensor, transposed(columns))
 
 
 def _unit_vectors(tensor: Rows[Fraction], moments: Vector) -> list[Vector] | None:
@@ -223,9 +224,9 @@ def _product(p: Sequence[Fraction], q: Sequence[Fraction]) -> tuple[Fraction, ..
 PIVOT, CENTRE = "pivot", "centre of mass"
 _ROUNDED_BITS = 256
 _ROUNDED_DATA = Fraction(1, 2**40)
-"""A plate or a rod in rounded numbers is one."""
+"""Tolerance of a plate or a rod in rounded numbers."""
 _PRINTED_DATA = Fraction(1, 10**6)
-"""Part of the tensor: a plate or a rod in seven digits is not warned of."""
+"""Tolerance, as a part of the tensor, of a plate or a rod in seven digits."""
 _SHAPES = "Give 3 numbers (a diagonal tensor), 6 (I11, I22, I33, I12, I13, I23) or 9 (row by row)."
 
 
@@ -440,7 +441,7 @@ def _require_positive(tensor: Tensor, body: MassProperties) -> None:
     raise InputError(cause, mending(body) or remedy)
 
 
-# A body and its start out of texts: options of the command line, the tables of a plan.
+# A body and its start from texts: options of the command line, tables of a plan.
 
 
 BODY = ("inertia", "weight", "centre", "mass", "gravity", "about", "rotor")

@@ -1,4 +1,4 @@
-"""Mass, centre of mass and inertia tensor out of files of robots: URDF, MJCF, SDF, USD, and TOML.
+"""Mass, centre of mass and inertia tensor of bodies in files: URDF, MJCF, SDF, USD, and TOML.
 
 Numbers are exact, to the digits in the file.  A rotation of the inertial axes with irrational entries is rounded to
 2^-64.  Units are kg and metres, as these formats have it.
@@ -107,7 +107,7 @@ def read_body(path: Path, link: str | None = None) -> BodyInFile:
 
 
 Link = tuple[str, Callable[[], BodyInFile]]
-"""The name of a link or body, and what reads it: a fault of one does not keep another from being read."""
+"""The name of a link or body, and its reader: a fault of one does not prevent reading another."""
 
 
 def _links(path: Path) -> Iterator[Link]:
@@ -162,7 +162,7 @@ def _around(root: Element) -> _Around:
 
 
 def _of_links(root: Element, reader: Callable[[str, Element, Element, _Around], BodyInFile]) -> Iterator[Link]:
-    """The links with an inertial element, by their names; where several models have links, behind the model's."""
+    """The links with an inertial element, by their names, after that of the model where several models have links."""
     around = _around(root)
     several = len({around[link] for link in root.findall(".//model/link")}) > 1
     for link in root.iter("link"):
@@ -230,7 +230,7 @@ class _Numbers:
                 raise InputError(f"{self.where}: unknown {what} {name} of <{element.tag}>.", remedy)
 
     def attributes(self, element: Element | None, *known: str) -> Mapping[str, str]:
-        """Those of an element, all of them ``known``; none where it is not there."""
+        """Attributes of an element, all of them ``known``; none without the element."""
         if element is None:
             return {}
         self.require_known(element.attrib, element, known, "attribute")
@@ -422,7 +422,7 @@ class _SdfFrames:
         return _within((back, rotated(back, (-x, -y, -z))), self.in_model(element))
 
     def ball(self) -> Vector | None:
-        """Where a ball joint holds the link, or a frame attached to it, as its child."""
+        """The place of the ball joint whose child is the link, or a frame attached to it; None without one."""
         places, model = [], self.around[self.link]
         for joint in [part for part in self.around if (part.tag, part.get("type")) == ("joint", "ball")]:
             child = _base(joint)
@@ -443,7 +443,7 @@ class _SdfFrames:
         return element
 
     def gravity(self) -> Vector:
-        """That of the world around the link, zero where the link is exempt."""
+        """The gravity of the world around the link, zero where the link is exempt."""
         if not self.numbers.flag(self.link.findtext("gravity") or "true", "gravity"):
             return _ZERO
         worlds = [part for part in self.around.values() if part.tag == "world"]
@@ -451,7 +451,7 @@ class _SdfFrames:
 
 
 def _base(element: Element) -> str:
-    """What a joint or a frame of SDF is attached to."""
+    """Name of the frame to which a joint or a frame of SDF is attached."""
     return (element.findtext("child") or element.get("attached_to") or "").strip()
 
 
@@ -476,7 +476,7 @@ def _pose(numbers: _Numbers, pose: Element | None) -> Pose:
 
 
 def _mjcf(path: Path, root: Element) -> Iterator[Link]:
-    """The bodies with an inertial element, exactly; those that MuJoCo computes or takes from other files, by itself."""
+    """Bodies with an inertial element, read exactly; those that MuJoCo computes or includes, read by MuJoCo."""
     settings = {key: value for compiler in root.iter("compiler") for key, value in compiler.attrib.items()}
     if settings.get("coordinate", "local") != "local":
         raise InputError(f"{path} has global coordinates.", "Load and save it in MuJoCo 2.3.3, which makes them local.")
@@ -555,7 +555,7 @@ def _compiled(path: Path) -> Any:
 
 
 def by_mujoco(path: Path, name: str, index: int) -> BodyInFile:
-    """The body of this place in the file, as MuJoCo computes it in double."""
+    """The body of that name or index, as MuJoCo computes it in double."""
     model = _compiled(path)
     names = [model.body(i).name for i in range(model.nbody)]
     return _of_model(model, name, names.index(name) if name in names else index + 1)
@@ -580,7 +580,7 @@ def _of_doubles(values: Iterable[Any]) -> Any:
 
 
 def _included(path: Path, known: set[str | None]) -> Iterator[Link]:
-    """The bodies that a file takes from others."""
+    """Bodies that a file includes from others."""
     model = _compiled(path)
     for index in range(1, model.nbody):
         name = model.body(index).name or f"body{index}"
@@ -610,7 +610,7 @@ def _mjcf_six(numbers: _Numbers, inertial: Element) -> Sequence[str | None]:
 
 
 _ORIENTATIONS = {"quat": 4, "axisangle": 4, "xyaxes": 6, "zaxis": 3, "euler": 3}
-"""What gives the orientation of a frame in MJCF, and how many numbers that has."""
+"""Attributes of MJCF for the orientation of a frame, and their counts of numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -623,7 +623,7 @@ class _MjcfFrames:
     gravity: Vector
 
     def attributes(self, element: Element) -> dict[str, str]:
-        """Those of an element and of its class, or the nearest childclass around it, and of the classes around that."""
+        """Attributes of an element and of its class, or the nearest childclass around it, and of the outer classes."""
         name, outer, values = element.get("class"), element, dict(element.attrib)
         while name is None and outer in self.around:
             outer = self.around[outer]
@@ -757,7 +757,7 @@ def _prim(name: str, values: Mapping[str, str], units: Mapping[str, Fraction]) -
 
 _BINARY_USD = (b"PXR-USDC", b"PK\x03\x04")
 _COMPOSED = re.compile(rb"\b(references|payload|subLayers|inherits|variantSet)\b")
-"""What takes a prim of USD together from several places."""
+"""Composition of a prim of USD from several layers."""
 
 
 def composed_usd(path: Path) -> Iterator[Link]:

@@ -40,11 +40,11 @@ _context = fmpq_mpoly_ctx.get(VARIABLES, Ordering.lex)
 
 
 class NotRational(TypeError):
-    """A callable asked of an indeterminate for something that needs a number."""
+    """Raised where a callable needs the number of an indeterminate."""
 
 
 class Ratio:
-    """N/D over the rational functions of six indeterminates: what a callable is tried with.
+    """A rational function N/D of six indeterminates: the argument with which a callable is tried.
 
     numerator, denominator: without a common factor once they are :meth:`reduced`.
     """
@@ -62,7 +62,7 @@ class Ratio:
 
     @staticmethod
     def of(value: Any) -> Ratio:
-        """A number, or what is one already; raises NotRational for anything else."""
+        """The ratio of a number, or a ratio as it is; raises NotRational for anything else."""
         if isinstance(value, Ratio):
             return value
         try:
@@ -145,7 +145,7 @@ class Ratio:
 
     @property
     def constant(self) -> Fraction:
-        """The number that it is, where it depends on nothing."""
+        """The value of a constant ratio."""
         part = [(part.to_dict() or {(0,) * 6: fmpq(0)})[(0,) * 6] for part in (self.numerator, self.denominator)]
         return Fraction(int(part[0].p), int(part[0].q)) / Fraction(int(part[1].p), int(part[1].q))
 
@@ -186,7 +186,7 @@ class EventFunction:
 
 
 class Wanted(NamedTuple):
-    """The events that are asked for.
+    """Requested events.
 
     direction: 1 for those at which the function rises with time, −1 where it falls, 0 for all.
     limit: stop after so many.  reached: called with the times on the way.
@@ -381,7 +381,7 @@ def first_term(
     )
 
 
-# What is found of events: of a computed motion as numbers of its format, of a known one as balls.
+# Events: of a computed motion as numbers of its format, of a known one as balls.
 
 
 _SHOWN = 15

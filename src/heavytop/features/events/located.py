@@ -58,7 +58,7 @@ class Found(NamedTuple):
 
 
 def locate(run: Dense, integrator: str, wanted: Wanted, axes: Axes | None = None) -> Events:
-    """The events of a run, up to its ``until``; it is told the time of each step.
+    """The events of a run, up to its ``until``.
 
     axes: the rows of A where the function is of v_given = A v, and the states are wanted in these axes; None for those
     of the run.

@@ -45,7 +45,7 @@ from heavytop.top.attitude import rotated
 _GUARD_BITS = 24
 _ATTEMPTS = 3
 _MOST_PARTS = 4096
-"""Most of a step.  A simple zero takes some twenty; where a function is as small as its error, chance decides each."""
+"""Most parts of a step.  A simple zero takes some twenty; where the function is as small as its error, many more."""
 _REFINEMENTS = 200
 _MOST_ORDER = 8
 """Derivatives that may vanish at t = 0 beside a function that does."""
@@ -65,7 +65,7 @@ class ProvenEvent(NamedTuple):
 
 
 class _Undecided(HeavyTopError):
-    """The precision does not decide what happens near a time."""
+    """Raised where the precision does not decide the events near a time."""
 
     def __init__(self, time: Fraction, why: str) -> None:
         super().__init__(why)

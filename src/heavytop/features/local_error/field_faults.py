@@ -1,7 +1,7 @@
-"""The one number of the field that is wrong, where that explains the errors of single steps.
+"""The wrong number of a field that explains the errors of single steps.
 
-A fault of the right-hand side makes errors of order 0: h times the difference of the fields.  Candidates are the field
-of the system with one factor s, which is 1 where it is right: at a term of the expanded Ω' or γ', at the terms of one
+A fault of the right-hand side causes errors of order 0: h times the difference of the fields.  Candidates are the field
+of the system with one factor s, which is 1 in the right field: at a term of the expanded Ω' or γ', at the terms of one
 monomial of the state, at a component, at a parameter, or at all of it.  Both fields are followed over the step from
 every state at which a call starts, in double, so that their difference is free of truncation; s is fitted to all calls
 at once, and what it leaves must be a hundredth.  Of a method with fixed steps the calls over h, 2 h and 4 h are
@@ -27,17 +27,17 @@ from heavytop.records import Explained
 from heavytop.top.equations import NAMES, Parameters, System
 
 _DROP, _ALIKE = 100.0, 30.0
-"""The error must fall by the first; of factors whose errors differ by less than the second, the roundest is meant."""
+"""The error must fall by the first; of factors whose errors differ by less than the second the roundest is chosen."""
 _ROUNDINGS = 1e4
-"""Of eps and the size of the state: smaller errors of a step are not asked about."""
+"""Multiple of eps and the size of the state below which errors of a step are not examined."""
 _RADIANS = 1 / 32
-"""Part of a step that a substep is, whose error of order 4 is 1e-10 of it."""
+"""Radians that the body turns in a substep, whose relative error of order 4 is 1e-10."""
 _ACTIVE = 1e-4
-"""Of the whole field: a factor that moves less of a motion is not fitted."""
+"""Part of the motion that a factor must change to be fitted."""
 _SMALL = 1e-3
 _REFINED = 4
 _NEAR = 30.0
-"""Times what is left, within which a fitted factor is a rounder number."""
+"""Multiple of the remaining error within which a fitted factor is rounded."""
 _DIGITS = range(1, 12)
 _LENGTHS = 1, 2, 4
 """Steps of the calls that are combined."""

@@ -1,7 +1,7 @@
-"""Error of single steps, and the order that a method has in truth.
+"""Error of single steps, and the observed order of a method.
 
-Each step is compared with the enclosure of the motion that starts exactly where the step starts: what earlier steps did
-wrong plays no part.  The order shows in steps of several lengths τ, whose error is C τ^(p+1).  At heyoka's own step
+Each step is compared with the enclosure of the motion that starts exactly where the step starts: errors of earlier
+steps play no part.  The order shows in steps of several lengths τ, whose error is C τ^(p+1).  At heyoka's own step
 length h the truncation error is far below rounding; there the step's polynomial is asked beyond it, at 2 h and 3 h.
 A method with fixed steps is asked for steps of 2 h, 4 h and on, until they err by more than rounding can.  Of one that
 keeps a memory a single step is that of its starting method: its order is that of whole runs at h, h/2 and h/4.
@@ -38,7 +38,7 @@ from heavytop.top.heavy_top import HeavyTop, State
 
 _NEAR, _FAR = 2, 3
 _ABOVE_ROUNDING = 1000
-"""Times eps and the size of the state: an error from which the order of a rounded step is read."""
+"""Multiple of eps and the size of the state above which the error of a rounded step shows an order."""
 LOCAL_ERROR = Quantity("local_error_ulp")
 
 
@@ -139,7 +139,7 @@ def _end(step: TaylorStep | Call, n: int) -> list[arb]:
     return result
 
 
-# Single steps of an integrator that keeps them to itself: calls over its own step size, from where its run stands.
+# Single steps of an integrator that does not expose them: calls over its own step size, from states of its run.
 
 
 _CALLS = 16
@@ -148,7 +148,7 @@ _LONGER = (2, 4, 8, 16, 32, 64)
 _LONGEST = 2
 """Radians: in longer steps no order shows."""
 _UNSEEN = 10
-"""Times as large as the largest error of 16 steps may be that of another."""
+"""Multiple of the largest error of 16 steps that another step may have."""
 
 
 def single_calls(
@@ -194,7 +194,7 @@ def single_calls(
 
 
 def stepped(integrator: Integrator) -> Integrator:
-    """With the step 1/100 where it has fixed steps and none is given."""
+    """The integrator with the step 1/100 where it has fixed steps and none is given."""
     if integrator.set_to is not None or registry.control_name(integrator) != "step":
         return integrator
     return replace(integrator, set_to=("step", DEFAULT_STEP))
@@ -245,7 +245,7 @@ def error_at_end(run: Trajectory) -> Fraction:
 
 _REFINED = (0, -1, -2, -3, -4)
 _COARSENED = (1, 2, 3, 4, 5, 6)
-"""Binary logarithms of steps over h: refined until two orders in succession agree, or an error drowns in rounding."""
+"""Binary logarithms of steps over h: refined until two successive orders agree, or rounding dominates."""
 _AGREE = 0.3
 
 

@@ -33,7 +33,7 @@ _SHADES = 16
 _IN_A_ROW = 5
 _POINTS, _LONGEST = 240, 20
 _AXES = (numpy.array([1.0, -1.0, 0.0]) / 2**0.5, numpy.array([-1.0, -1.0, 2.0]) / 6**0.5)
-"""Right and up, of who looks at the unit sphere from (1, 1, 1)."""
+"""Right and up on the unit sphere seen from (1, 1, 1)."""
 
 
 def survey_charts(sources: Sources, first: Iterable[str] = ()) -> Section | None:

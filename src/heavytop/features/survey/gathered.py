@@ -1,4 +1,4 @@
-"""The chunks of a survey together: one row with counts, quantiles and the worst motions."""
+"""The row of a survey: counts, quantiles, distributions and the worst motions of all its chunks."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.scalar import of_fraction
 from heavytop.records import CellMap, Histogram, Metric, Quantity, Row, RowKey, Spread, Worst, by_name
 
-# The file of a survey: one Parquet row group a chunk, one row a motion.
+# The file of a survey: one Parquet row group per chunk, one row per motion.
 
 
 FILE = "survey.parquet"
@@ -34,7 +34,7 @@ _ERRORS = ("digits_right", "error_max", "error_time", "error_omega", "error_gamm
 DRIFT_COLUMNS = ("drift_gamma_squared", "drift_area", "drift_energy", "drift_further")
 DATA = tuple(f"{name}{i}" for name in ("inertia", "moment", "rotor", "omega", "gamma") for i in (1, 2, 3))
 COLUMNS = ("sweep", "index", *_TEXTS[1:], *_ERRORS, *DRIFT_COLUMNS, "steps", *DATA)
-"""In the order of the file.  inertia1 to gamma3 are the rounded top and start, moment that of the weight, P r."""
+"""Columns in the order of the file.  inertia1 to gamma3 are the rounded top and start, moment is P r."""
 
 
 def _schema() -> Any:
@@ -79,7 +79,7 @@ def read_chunk(content: bytes) -> Any:
 
 
 def write(path: Path, chunks: Iterable[bytes]) -> None:
-    """All chunks into one file, a row group each, one at a time in memory; whole or not at all."""
+    """Write all chunks into one file, a row group each, one at a time in memory, atomically."""
     schema = _schema()
     with atomic_write(path) as file, _writer(file, schema) as writer:
         for content in chunks:
@@ -87,7 +87,7 @@ def write(path: Path, chunks: Iterable[bytes]) -> None:
             writer.write_table(table, row_group_size=max(1, table.num_rows))
 
 
-# Distributions of the quantities of many motions, and the digits lost over two of their data.
+# Distributions of quantities over the motions, and the digits lost over two of their data.
 
 
 WIDTH = 0.25
@@ -109,7 +109,7 @@ def histogram(values: NDArray[numpy.float64]) -> Histogram | None:
 
 
 def two_of(columns: Mapping[str, Any]) -> tuple[str, ...]:
-    """The first two data that are not the same in all motions, Ω before γ before the top."""
+    """The first two data that differ between motions, Ω before γ before the top."""
     ordered = sorted(DATA, key=lambda name: (_FIRST.index(name[:-1]), name))
     return tuple(name for name in ordered if len(numpy.unique(columns[name])) > 1)[:2]
 

@@ -1,9 +1,9 @@
-"""The motions of a survey that got worse: two survey.parquet joined by motion, where both hold the same tops.
+"""Motions of a survey that got worse: two survey.parquet joined by motion, where both hold the same tops.
 
-The quantiles of the row decide the verdict; a fault in a small part of the motions moves none but the maximum, and
-the list names it.  A motion is worse where it does not reach its horizon any more, or where its error has grown by
+The quantiles of the row decide the verdict; a fault in a small part of the motions changes only the maximum, and the
+list names these motions.  A motion is worse where it no longer reaches its horizon, or where its error has grown by
 more than the policy allows and by more than rounding noise: the noise band is the half-width of the central 95 % of
-all changes of error, taken on the side where fewer decades are, for a fault widens one side alone.
+all changes of error, on the narrower side, because a fault widens one side alone.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from heavytop.top.heavy_top import HeavyTop, State
 MOST = 5
 """Motions of a survey that are listed; the others are counted."""
 METRIC = "solution_error_relative_max"
-"""Whose allowance in a policy is that of a motion's error too."""
+"""The metric whose allowance in a policy also applies to the error of a motion."""
 _SAME = ("sweep", "integrator", "tolerance", "precision", "horizon")
 _TAIL = 0.025
 

@@ -150,7 +150,7 @@ def _problem(numbers: NDArray[numpy.float64]) -> Problem:
 
 
 def _may_have_more(p: Any) -> Any:
-    """Where two moments of inertia are equal or a component of the centre is 0: else no further integral is known."""
+    """Where two moments of inertia are equal or a component of the centre is 0; others have no further integral."""
     equal = (p[:, 0] == p[:, 1]) | (p[:, 1] == p[:, 2]) | (p[:, 0] == p[:, 2])
     return (equal | (p[:, 3:6] == 0).any(axis=1)).tolist()
 
@@ -164,7 +164,7 @@ DRIFTS = ("gamma_squared", "area", "energy", "further")
 _TOLERANCES = Fraction(1, 2**96), Fraction(1, 2**84)
 """The tolerances of both runs in double; other orders and steps.  In extended: double-double's own, and the first."""
 _MODERATE = 1e4
-"""Larger data, and times, are looked at motion by motion."""
+"""Motions with larger data or times are computed one by one."""
 _STEP_LIMIT = 1_000_000
 _FLOOR = 1e-28
 _RADII = 10
@@ -192,7 +192,7 @@ def measured(
 
 
 def _usual(drawn: Drawn, times: Sequence[Fraction], precision: Precision) -> bool:
-    """Whether the motions can be computed as arrays: doubles, and times that are out of nobody's reach."""
+    """Whether the motions can be computed as arrays: doubles, and data and times of moderate size."""
     if precision != DOUBLE or times[0] <= 0 or max(abs(drawn.numbers.high).max(), float(times[-1])) > _MODERATE:
         return False
     return bool(drawn.numbers.high[:, :3].min() > 1 / _MODERATE)

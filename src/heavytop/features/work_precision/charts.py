@@ -174,15 +174,13 @@ def _numbers(source: str, row: Row) -> list[str]:
 
 
 def _least(row: Row) -> str:
-    """Seconds of the fastest run, or below how many they are not resolved."""
+    """Seconds of the fastest run, or the resolution below which they lie."""
     if UNRESOLVED_SECONDS in row.seconds:
         return f"< {row.seconds[UNRESOLVED_SECONDS]:.3g}"
     return f"{row.seconds['least']:.3g}" if "least" in row.seconds else ""
 
 
-# How the errors of different methods grow at about the same accuracy: one that preserves structure beside two others.
-#
-# Read off the rows of work against precision; drawn on the page and as a figure.
+# Growth of the errors of methods of about the same accuracy: one that preserves structure, and two that do not.
 
 
 METHODS = ("heyoka", "cyrk:DOP853", "splitting:4")
@@ -192,11 +190,11 @@ QUANTITIES = (
 )
 """Series, name, axis, and the power of the steps by which rounding errors alone grow."""
 _LOG10 = -5.0
-"""The error that the points of the methods are to have."""
+"""log10 of the error at which the methods are compared."""
 _DECADES, _FEWEST_DECADES = 2.0, 1.5
 _FITTED = Key("fitted power of t", 5, "", "6 3")
 _ABOVE_ROUNDING = 10
-"""Times the error that rounding may have made: below, the exponent of a single motion is chance."""
+"""Multiple of the error that rounding may cause below which the exponent of a single motion is random."""
 
 
 @dataclass(frozen=True, slots=True)

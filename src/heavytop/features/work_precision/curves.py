@@ -1,4 +1,4 @@
-"""Work against precision, read off the rows of a report: one line for each integrator and format, and what it shows."""
+"""Work-precision curves of the rows of a report, one for each integrator and format, and comparisons of them."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from heavytop.report.document.document import Headline, In, Table, clip, scienti
 
 _MOST_CASES = 2
 _ABOVE_ROUNDING = 100
-"""Times the roundings of all steps: an error from which an order is read."""
+"""Multiple of the roundings of all steps above which an error shows an order."""
 _APART = 1.2
-"""Times the finer of two steps that show an order: roundings move that of nearer ones."""
+"""Ratio of two steps from which an order is computed: nearer ones are dominated by rounding."""
 OURS, CONSTANTS, LANES = "heyoka", "heyoka:constants", "heyoka:lanes"
 """heyoka; with the numbers of the top compiled into its code; eight motions at once.  Others compare with these."""
 
@@ -27,8 +27,8 @@ class WorkPrecisionPoint:
     """One point that reached the end: log10 of its error, its seconds, its tolerance or step in words.
 
     step: fixed, or the mean one of a method with an order and a tolerance; 0 where its error may be rounding.
-    seconds: of its fastest run, or where these are too few to be resolved, as many as are.  Other work on the machine
-    only ever adds, and adds more to longer runs: medians on a busy machine would flatter whoever is quick.
+    seconds: of its fastest run, or the resolution where these are fewer.  Other work on the machine only adds time, and
+    more to longer runs: medians on a busy machine would favour the faster integrator.
     """
 
     log10: float
@@ -44,11 +44,11 @@ class WorkPrecisionPoint:
 
 @dataclass(slots=True)
 class WorkPrecisionLine:
-    """One integrator in one format, from coarse to fine as the plan has it.
+    """The curve of one integrator in one format, from coarse to fine in the order of the plan.
 
-    failures: the seconds that points took which did not reach the end; they have no error.  declared: its order.
-    compile: seconds that compiling took, at most over the points; 0 where none is known.
-    resolution: seconds at and below which those of points are not resolved.
+    failures: seconds of runs that did not reach the end; they have no error.  declared: the order of the integrator.
+    compile: most seconds of compilation over the points; 0 where unknown.
+    resolution: seconds up to which times are not resolved.
     """
 
     integrator: str
@@ -61,8 +61,8 @@ class WorkPrecisionLine:
 
     @property
     def order(self) -> float | None:
-        """The order that whole runs show: between the finest step whose error is more than rounding and the next one
-        that is not nearly equal; None where one up to that has no larger error.
+        """The order observed in whole runs: between the finest step whose error exceeds rounding and the next one that
+        is 1.2 times as long; None where a step up to that has no larger error.
         """
         points = sorted((point for point in self.points if point.step), key=lambda point: point.step)
         coarse = next((point for point in points if point.step >= _APART * points[0].step), None)
@@ -72,7 +72,7 @@ class WorkPrecisionLine:
 
     @property
     def order_text(self) -> str:
-        """The order seen, and the declared one behind it; "-" where none is seen."""
+        """The observed order followed by the declared one; "-" where none is observed."""
         declared = f" (declared: {self.declared})" if self.declared else ""
         return "-" if self.order is None else f"{self.order:z.1f}{declared}"
 
@@ -105,11 +105,11 @@ class WorkPrecisionLine:
 
 @dataclass(frozen=True, slots=True)
 class Lead:
-    """How heyoka compares with the fastest other integrator that reaches an error, on one case.
+    """Comparison of heyoka with the fastest other integrator that reaches an error, on one case.
 
-    log10: of the error.  ours, theirs, lanes: seconds, None where none reaches it.  name, other: who took them.
-    general: label and seconds of heyoka with one code for every top, where ``name`` is compiled for this one.
-    compile: seconds to compile, at most, of each of the two forms.
+    log10: of the error.  ours, theirs, lanes: seconds, None where none reaches it.  name, other: of these integrators.
+    general: label and seconds of heyoka with one code for every top, where ``name`` has the constants of this one.
+    compile: most seconds of compilation of each of the two forms.
     """
 
     case: str
@@ -124,7 +124,7 @@ class Lead:
 
     @property
     def ratio(self) -> float | None:
-        """How many times as fast heyoka is."""
+        """The seconds of the other integrator over those of heyoka."""
         return self._ratio(self.ours)
 
     def _ratio(self, seconds: float | None) -> float | None:
@@ -308,8 +308,8 @@ def seconds_text(seconds: float, digits: int = 3) -> str:
 
 
 def fastest(rows: Sequence[Row]) -> Headline | None:
-    """Who is fastest at 1e-10 and by how much, over the motions on which heyoka and another reach it; else the least
-    error of all.
+    """The fastest integrator at 1e-10 and its lead, over the motions on which heyoka and another reach it; else the
+    least error of all.
     """
     ratios_of = [(lead, ratio) for lead in leads(rows) if lead.log10 == -10 and (ratio := lead.ratio) is not None]
     if not ratios_of:

@@ -50,7 +50,7 @@ _FOR_COMPARISON = Repeats(11, 201, 1.0, 3, band=True)
 ERROR_MAX, ERROR_FINAL = ERRORS
 RETURN = Quantity("return_error")
 _RUNGS = {"tolerance": ["1e-6", "1e-9", "1e-12", FINEST], "step": ["1/10", "1/30", "1/100", "1/300"], "": [FINEST]}
-"""Of an integrator that is measured beside heyoka in double, by what it is set by."""
+"""Points in double of an integrator that is compared with heyoka, by its control parameter."""
 _MISSING = Metric("missing", None)
 _OF_OTHERS = 0.6
 """Decades of rounding noise of third-party integrators, whose step control turns a rounding into another step: rerun
@@ -226,8 +226,8 @@ class WorkPrecision(Kind):
             yield "error_final: not the last value of its series"
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
-        """Who is fastest at 1e-10 and by how much; a table a case; how heyoka compares, a sentence a case.  In short an
-        integrator beside heyoka, setting by setting, where there is one.
+        """The fastest integrator at 1e-10; a table and a sentence on heyoka for each case.  In short, the integrator
+        compared with heyoka point by point, where there is one.
         """
         if (headline := fastest(rows)) is not None:
             yield headline
@@ -319,6 +319,6 @@ def _returned(problem: Problem, run: Trajectory, integrate: Any) -> Metric:
 
 @lru_cache(maxsize=8)
 def _truth(problem: Problem, times: tuple[Fraction, ...]) -> Truth | str:
-    """Shared by all integrators that are compared with it, with every state that was worked out."""
+    """The reference shared by all integrators, with the states computed so far."""
     known = truth(problem, times)
     return known if isinstance(known, str) else known.remembered()
