@@ -217,8 +217,8 @@ def test_digits_that_count_as_zero_are(name: str) -> None:
             digits = run.rows[row * n : row * (n + 1)].reshape(-1, LANES)
             assert not digits[: products._BEFORE].any()
             for side in digits[products._BEFORE :].reshape(1 + run.vectors, count, LANES):
-                assert not side[: run.places[n]].any()
-        assert run.places[: run.order + 1].max() > 0
+                assert not side[: run.starts[n]].any()
+        assert run.starts[: run.order + 1].max() > 0
 
 
 @pytest.mark.slow
@@ -228,7 +228,7 @@ def test_the_bits_are_those_of_every_processor(processor) -> None:
     runs = [Fixed(given, grid_of(8), True, processor=each) for each in (None, processor)]
     for run in runs:
         assert run.advance(Fraction(2), 10**6) is Status.OK
-    own, other = ((run.state, run.steps, run.place(), run.sample(Fraction(2))) for run in runs)
+    own, other = ((run.state, run.steps, run.resume_words(), run.sample(Fraction(2))) for run in runs)
     assert own == other
 
 

@@ -35,7 +35,7 @@ def bits_on(processor: Processor | None, attitude: bool, tolerance: Fraction) ->
     """All that a run knows at t = 30, in code for that processor."""
     run = Floating(problem(1, attitude), OrderSchedule.of(tolerance), True, processor=processor)
     assert run.advance(Fraction(30), 10**6) is Status.OK
-    return run.state, run.time, run.steps, run.place(), run.sample(Fraction(30))
+    return run.state, run.time, run.steps, run.resume_words(), run.sample(Fraction(30))
 
 
 @pytest.mark.slow

@@ -188,7 +188,7 @@ def test_the_bits_are_those_of_every_processor(processor) -> None:
     runs = [Fixed(scaled, grid_of(3), True, processor=each) for each in (None, processor)]
     for run in runs:
         assert run.advance(Fraction(8), 10**6) is Status.OK
-    own, other = ((run.state, run.steps, run.place(), run.sample(Fraction(8))) for run in runs)
+    own, other = ((run.state, run.steps, run.resume_words(), run.sample(Fraction(8))) for run in runs)
     assert own == other
 
 

@@ -64,17 +64,17 @@ def test_more_bits_than_words_have_are_met_to_the_last() -> None:
 def test_a_run_is_taken_up_to_the_same_bits_and_samples_change_none() -> None:
     whole = IntegerMotion(problem(1, attitude=True), 200, True)
     assert whole.advance(Fraction(3), 100) is Status.OK
-    before, place = whole.steps, whole.place()
+    before, place = whole.steps, whole.resume_words()
     whole.sample(whole.time - Fraction(1, 1000))
     again = IntegerMotion(problem(1, attitude=True), 200, True)
     again.restore(place, before - 1)
     for run in (whole, again):
         assert run.advance(Fraction(6), 100) is Status.OK
-    assert (again.state, again.time, again.steps, again.place()) == (
+    assert (again.state, again.time, again.steps, again.resume_words()) == (
         whole.state,
         whole.time,
         whole.steps,
-        whole.place(),
+        whole.resume_words(),
     )
     assert whole.sample(whole.time) == whole.state
 

@@ -81,12 +81,12 @@ class ResumableRun(Steps):
     """An integration that can be resumed."""
 
     @abstractmethod
-    def place(self) -> tuple[str, ...]:
+    def resume_words(self) -> tuple[str, ...]:
         """The beginning of the last step as text, sufficient to resume with the same bits."""
 
     @abstractmethod
     def restore(self, numbers: tuple[str, ...], steps: int) -> None:
-        """Resume from a :meth:`place`; steps: taken before it."""
+        """Resume from :meth:`resume_words`; steps: taken before it."""
 
 
 # A problem in exact units in which its numbers are near 1.

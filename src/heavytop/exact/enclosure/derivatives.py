@@ -144,7 +144,7 @@ class Tangent:
     """The data that derivatives are computed with, in ulps of 2^-precision, along the motion of ``field``.
 
     certified, columns: Taylor coefficients of the motion, and of its derivatives, in words; None in integers.
-    data: those of :data:`DATA` in ``places``, whose columns are computed.
+    data: those of :data:`DATA` in ``indices``, whose columns are computed.
     """
 
     field: Quadratic
@@ -153,7 +153,7 @@ class Tangent:
     certified: CertifiedSeries | None
     columns: CertifiedColumns | None
     data: tuple[Datum, ...] = ()
-    places: tuple[int, ...] = ()
+    indices: tuple[int, ...] = ()
 
     @property
     def width(self) -> int:
@@ -407,17 +407,17 @@ def _one_way(
     motion = known.motion(direction)
     time = direction * spans[-1]
     loss, steps = known.forecast(time, bits)
-    places = _independent(known, motion) if data else ()
-    spare = (_OF_DATA + _OF_LAWS * (len(places) < len(DATA))) * data
+    indices = _independent(known, motion) if data else ()
+    spare = (_OF_DATA + _OF_LAWS * (len(indices) < len(DATA))) * data
     bits_of_motion = bits + loss + _GUARD + spare + int(min(loss, _FEW * bits) / 4)
     bits_of_columns = bits + _OF_COLUMNS + 0.9 * min(loss, _MOST_OF_COLUMNS)
     for _ in range(_ATTEMPTS):
-        columns = steps * (7 + len(places))
+        columns = steps * (7 + len(indices))
         of_columns = motion.precision(bits_of_columns, columns)
         planned = max(motion.precision(bits_of_motion, steps), of_columns)
         if not motion.seconds(planned, loss, steps) + columns * seconds_a_step(*of_columns) < known.effort:
             break
-        tangent = _tangent(known, motion, *of_columns, places)
+        tangent = _tangent(known, motion, *of_columns, indices)
         start = start_node(motion.field, motion.scaled.state, planned[0])
         run = EnclosureRun(motion, planned[0], (start,), motion.certified(planned[0]) if planned[1] else None)
         enclosed, lacking = {}, 0
@@ -451,9 +451,9 @@ def _independent(known: Validated, motion: ScaledMotion) -> tuple[int, ...]:
 
 
 def _tangent(
-    known: Validated, motion: ScaledMotion, precision: int, in_words: bool, places: tuple[int, ...]
+    known: Validated, motion: ScaledMotion, precision: int, in_words: bool, indices: tuple[int, ...]
 ) -> Tangent:
-    data = _data(known, motion, places)
+    data = _data(known, motion, indices)
     data_of = tuple(datum for datum, _ in data)
     together = Together.of(motion.field, [datum.field for datum in data_of])
     lanes = [lanes_of_datum for _, lanes_of_datum in data if lanes_of_datum is not None]
@@ -462,15 +462,15 @@ def _tangent(
     if grid is not None and not grid.relative and len(lanes) == len(data):
         certified = motion.certified(precision)
         columns = CertifiedColumns(certified, lanes) if certified else None
-    tangent = Tangent(motion.field, precision, together, certified, columns, data_of, places)
+    tangent = Tangent(motion.field, precision, together, certified, columns, data_of, indices)
     _require_right(tangent, motion)
     return tangent
 
 
 @whole_evaluation
-def _data(known: Validated, motion: ScaledMotion, places: Sequence[int]) -> list[tuple[Datum, Coefficients | None]]:
+def _data(known: Validated, motion: ScaledMotion, indices: Sequence[int]) -> list[tuple[Datum, Coefficients | None]]:
     with series_length(2):
-        return [_datum(known, motion, k) for k in places]
+        return [_datum(known, motion, k) for k in indices]
 
 
 def _datum(known: Validated, motion: ScaledMotion, datum: int) -> tuple[Datum, Coefficients | None]:
@@ -627,20 +627,20 @@ def _in_units(known: Validated, motion: ScaledMotion, tangent: Tangent, values: 
             for line, bounds, size in zip(rows, limits, sizes, strict=True)
         ]
         start, data = [line[: len(rows)] for line in table], [line[len(rows) :] for line in table]
-        if len(tangent.places) in (0, len(DATA)):
+        if len(tangent.indices) in (0, len(DATA)):
             return EnclosedDerivatives(start, data if tangent.data else None)
         state = [value * ball(size) for value, size in zip(taken.around(tau, around), sizes, strict=True)]
-        return EnclosedDerivatives(start, _completed(known, tangent.places, state, start, data))
+        return EnclosedDerivatives(start, _completed(known, tangent.indices, state, start, data))
 
 
-def _completed(known: Validated, places: Sequence[int], state: list[arb], start: Balls, data: Balls) -> Balls:
-    """S from its columns of ``places``, by (c)."""
+def _completed(known: Validated, indices: Sequence[int], state: list[arb], start: Balls, data: Balls) -> Balls:
+    """S from its columns of ``indices``, by (c)."""
     size = [ball(value) for value in (*known.parameters.inertia, *known.parameters.moment)]
     gamma = [ball(value) for value in known.start.gamma]
     completed = []
     for i, (of_start, of_data) in enumerate(zip(start, data, strict=True)):
-        row = dict(zip(places, of_data, strict=True))
-        for k in (k for k in (3, 4, 5, 0, 1, 2) if k not in places):
+        row = dict(zip(indices, of_data, strict=True))
+        for k in (k for k in (3, 4, 5, 0, 1, 2) if k not in indices):
             others = [j for j in range(3 if k > 2 else 0, len(DATA)) if j != k]
             total = sum(map(mul, gamma, of_start[3:]), -state[i] if i > 2 else arb(0)) if k > 2 else arb(0)
             row[k] = (total - sum((size[j] * row[j] for j in others), arb(0))) / size[k]

@@ -398,7 +398,7 @@ class _Pace(SampledRun):
 
     def place(self, samples: int, seconds: float, flags: dict[str, str]) -> ResumePoint:
         """Where the last step began; at rest, the beginning."""
-        words, steps = ((), 0) if self.scaled.rest else (self.run.place(), self.run.steps - 1)
+        words, steps = ((), 0) if self.scaled.rest else (self.run.resume_words(), self.run.steps - 1)
         return ResumePoint(samples, (), (), steps, seconds, flags, words)
 
     def take_up(self, resume_point: ResumePoint, covered: Any) -> None:
@@ -407,5 +407,5 @@ class _Pace(SampledRun):
             self.run.restore(resume_point.words, resume_point.steps)
             self.reach(exact(covered))
             resume_point.require_covered(self.run.steps)
-            if self.run.place() != resume_point.words:
+            if self.run.resume_words() != resume_point.words:
                 raise ValueError("words that are no state of this arithmetic")

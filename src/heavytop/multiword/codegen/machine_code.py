@@ -404,28 +404,28 @@ class Code:
         product = a * b
         return product, self.fma(a, b, -product)
 
-    def _place(self, base: Operand, offset: Index) -> ir.Value:
+    def _item(self, base: Operand, offset: Index) -> ir.Value:
         return self.builder.gep(base.raw, [_typed(INT, offset)])
 
     def address(self, base: Operand, offset: Index) -> Operand:
         """The address of ``base[offset]``."""
-        return self.value(self._place(base, offset))
+        return self.value(self._item(base, offset))
 
     def load_one(self, base: Operand, offset: Index) -> Operand:
         """``base[offset]``, a double or an integer."""
-        return self.value(self.builder.load(self._place(base, offset)))
+        return self.value(self.builder.load(self._item(base, offset)))
 
     def store_one(self, value: Number, base: Operand, offset: Index) -> None:
         """Store a double or an integer at ``base[offset]``."""
-        self.builder.store(_typed(base.type.pointee, value), self._place(base, offset))
+        self.builder.store(_typed(base.type.pointee, value), self._item(base, offset))
 
     def load(self, base: Operand, offset: Index) -> Operand:
         """The eight doubles from ``base[offset]`` on, aligned to 64 bytes."""
-        return self.value(self.builder.load(self.builder.bitcast(self._place(base, offset), _VECTOR_POINTER), align=64))
+        return self.value(self.builder.load(self.builder.bitcast(self._item(base, offset), _VECTOR_POINTER), align=64))
 
     def store(self, value: Operand, base: Operand, offset: Index) -> None:
         """Store eight doubles from ``base[offset]`` on, aligned to 64 bytes."""
-        self.builder.store(value.raw, self.builder.bitcast(self._place(base, offset), _VECTOR_POINTER), align=64)
+        self.builder.store(value.raw, self.builder.bitcast(self._item(base, offset), _VECTOR_POINTER), align=64)
 
     def phi(self, kind: ir.Type) -> Operand:
         """A phi node, whose values :meth:`add_incoming` sets for each preceding block."""

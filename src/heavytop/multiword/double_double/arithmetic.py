@@ -110,10 +110,10 @@ def behind(code: Code, time: Pair, began: Pair, sign: Operand) -> tuple[Pair, Op
 def polynomials(
     code: Code, orders: Pair, points: Sequence[Pair], count: int, row: Callable[[Operand], list[Pair]]
 ) -> list[list[Operand]]:
-    """The words of Σ row(n) x^n at each place x, for each of the ``count`` numbers of a row, from the highest order.
+    """The words of Σ row(n) x^n at each point x, for each of the ``count`` numbers of a row, from the highest order.
 
     orders: the last one in double-double, and the highest; those between are in plain doubles.
-    The sums of one place depend on each other, those of several do not.
+    The sums of one point depend on each other, those of several do not.
     """
     low_order, order = orders
 

@@ -227,7 +227,7 @@ class Floating(ResumableRun):
         starts = [n * self.layout.row + self.layout.value(v) for v in vectors]
         return numpy.concatenate([self.scratch[start : start + 16] for start in starts])
 
-    def place(self) -> tuple[str, ...]:
+    def resume_words(self) -> tuple[str, ...]:
         clock = self.clock[[dd.BEGAN, dd.BEGAN_LOW]]
         counts = self.counts[[dd.USED, dd.USED_TRIES, dd.USED_SLOPE]]
         units = self.words[self.layout.units + 8 * self.layout.vectors :]

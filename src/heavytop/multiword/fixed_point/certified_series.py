@@ -77,15 +77,15 @@ class Total(Sequence[int]):
     """Σ b_n of each component, whole ulps, stored as words, from which the next step starts."""
 
     def __init__(self, words: Doubles, certified: CertifiedSeries) -> None:
-        self.words, self._carrier = words, certified
+        self.words, self.certified = words, certified
 
     @cached_property
     def _values(self) -> list[int]:
-        grid, indices = self._carrier.grid, self._carrier.places
+        grid, indices = self.certified.grid, self.certified.offsets
         return list(in_ulps(self.words[indices], grid))
 
     def __len__(self) -> int:
-        return len(self._carrier.places)
+        return len(self.certified.offsets)
 
     def __getitem__(self, index: Any) -> Any:
         return self._values[index]
@@ -163,7 +163,7 @@ class CertifiedSeries:
         self._threads = local()
         self._columns = [*range(6), *range(11, 14)][: 3 + 3 * self.vectors]
         first = numpy.array([lane % 8 + 8 * grid.words * (lane // 8) for lane in self._columns])
-        self.places = first[:, None] + 8 * numpy.arange(grid.words)
+        self.offsets = first[:, None] + 8 * numpy.arange(grid.words)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return (CertifiedSeries, self._own)
@@ -207,7 +207,7 @@ class CertifiedSeries:
         if isinstance(centre, Total):
             scratch.state[:] = centre.words
         else:
-            scratch.state[self.places] = [words_of(value, self.grid) for value in centre]
+            scratch.state[self.offsets] = [words_of(value, self.grid) for value in centre]
         status = self.machine.functions["series"](*scratch.pointers, self.sign * factor, raises, scratch.found)
         return int(status)
 
@@ -271,8 +271,8 @@ class _Scratch:
         room = size_of(certified.grid, vectors)
         self.state, self.result, self.rows = doubles(size), doubles(size), doubles(room.rows)
         inputs = [self.state, certified.constants, certified.inverses, self.rows]
-        places = numpy.zeros(room.places, numpy.int64)
-        self._kept: list[Doubles | Integers] = [*inputs, doubles(room.sums), places, doubles(8)]
+        starts = numpy.zeros(room.starts, numpy.int64)
+        self._kept: list[Doubles | Integers] = [*inputs, doubles(room.sums), starts, doubles(8)]
         self.pointers, self.found = [pointer(array) for array in self._kept], pointer(self.result)
         self.values, self.sizes = doubles(8 * vectors * orders), doubles(8 * vectors * orders)
         widest, added = doubles(8 * words * (1 + vectors)), doubles(size)

@@ -65,11 +65,11 @@ _UP = 1 + 2.0**-40
 
 
 class _ColumnRows(WordRows):
-    """The sums of a column.  places: also the number of orders in which the first u + 1 words were 0."""
+    """The sums of a column.  starts: also the number of orders in which the first u + 1 words were 0."""
 
     def begin(self, y: list[Operand], wide: Operand) -> Operand:
         for k in range(self.grid.words):
-            self.code.store_one(0, self.places, self._quiet(k))
+            self.code.store_one(0, self.starts, self._quiet(k))
         return WordRows.begin(self, y, wide)
 
     def _quiet(self, k: int) -> int:
@@ -80,18 +80,18 @@ class _ColumnRows(WordRows):
         count, only = code.integer(0), code.true
         for k in range(self.grid.words - 1):
             only &= code.largest(code.absolute(y[k])) == 0
-            quiet = code.select(only, code.load_one(self.places, self._quiet(k)) + 1, 0)
-            code.store_one(quiet, self.places, self._quiet(k))
+            quiet = code.select(only, code.load_one(self.starts, self._quiet(k)) + 1, 0)
+            code.store_one(quiet, self.starts, self._quiet(k))
             count = code.select(quiet >= _QUIET, k + 1, count)
         return code.larger(count, before)
 
 
 @dataclass(slots=True)
 class _ColumnCode(SeriesCode):
-    """Writes ``column(state, constants, inverses, rows, sums, places, seen, factor, raises, result, motion, known,
+    """Writes ``column(state, constants, inverses, rows, sums, starts, seen, factor, raises, result, motion, known,
     order)`` and ``column_of_data(…, order, gathered, slopes)``.
 
-    As ``series``, for a column that starts at ``state``.  motion, known: rows and places of the motion.  order: N.
+    As ``series``, for a column that starts at ``state``.  motion, known: rows and starts of the motion.  order: N.
     gathered: the result of ``gather``.  slopes: the words of G, in the layout of the constants of f.
     """
 
@@ -106,10 +106,10 @@ class _ColumnCode(SeriesCode):
             arguments += [POINTER, POINTER]
         name = "column_of_data" if self.of_data else "column"
         made, self.code = function(self.module, name, INT, arguments)
-        state, _, _, rows, sums, places, seen, _, _, result, motion, known, order = self.code.arguments[:13]
+        state, _, _, rows, sums, starts, seen, _, _, result, motion, known, order = self.code.arguments[:13]
         code, b, grid = self.code, self.code.builder, self.grid
         words, room = grid.words, most_orders(grid) + 2
-        self.rows = _ColumnRows(code, grid, 1, room, rows, sums, places, seen, list(self.kernels))
+        self.rows = _ColumnRows(code, grid, 1, room, rows, sums, starts, seen, list(self.kernels))
         along = WordRows(code, grid, 1, room, motion, sums, known, seen, list(self.kernels))
         first = [code.load(state, 8 * k) for k in range(words)]
         code.store(code.zero, seen, 0)
@@ -154,12 +154,12 @@ class _ColumnCode(SeriesCode):
         return products
 
     def write_gather(self) -> None:
-        """Write ``gather(rows, places, sums, seen, order, result)``: the gathered sums of b and b_n, for n < order."""
+        """Write ``gather(rows, starts, sums, seen, order, result)``: the gathered sums of b and b_n, for n < order."""
         arguments = [POINTER, INT_POINTER, POINTER, POINTER, INT, POINTER]
         _, self.code = function(self.module, "gather", ir.VoidType(), arguments)
         code, words = self.code, self.grid.words
-        rows, places, sums, seen, order, result = code.arguments
-        along = WordRows(code, self.grid, 1, most_orders(self.grid) + 2, rows, sums, places, seen, list(self.kernels))
+        rows, starts, sums, seen, order, result = code.arguments
+        along = WordRows(code, self.grid, 1, most_orders(self.grid) + 2, rows, sums, starts, seen, list(self.kernels))
         code.store(code.zero, seen, 0)
 
         def one(n: Operand, _: list[Operand]) -> None:
@@ -296,9 +296,9 @@ class _Scratch:
         grid, orders, count = certified.grid, most_orders(certified.grid) + 2, 6 + data
         room = WordRows.size(grid, 1, orders)
         self.state, self.rows = doubles(8 * grid.words), doubles(room.rows)
-        gathered, places = doubles(16 * grid.words * orders), numpy.zeros(room.places + grid.words, numpy.int64)
+        gathered, starts = doubles(16 * grid.words * orders), numpy.zeros(room.starts + grid.words, numpy.int64)
         inputs, sums = [self.state, certified.constants, certified.inverses, self.rows], doubles(room.sums)
-        arrays_used: list[Doubles | Integers] = [*inputs, sums, places, doubles(8)]
+        arrays_used: list[Doubles | Integers] = [*inputs, sums, starts, doubles(8)]
         self.pointers, self.gathered = [pointer(array) for array in arrays_used], pointer(gathered)
         nearest = doubles(8 * orders)
         self._kept = [*arrays_used, gathered, nearest]

@@ -107,7 +107,7 @@ class Fixed(ResumableRun):
             self.words[offset : offset + 8 * grid.words : 8] = digits(value, grid)
         self.inverses = inverses(grid)
         self.rows, self.sums, self.seen = doubles(scratch.rows), doubles(scratch.sums), doubles(8)
-        self.places = numpy.zeros(scratch.places, numpy.int64)
+        self.starts = numpy.zeros(scratch.starts, numpy.int64)
         self.clock, self.counts = doubles(steps.CLOCK), numpy.zeros(steps.COUNTS, numpy.int64)
         self.clock[steps.SIGN] = 1.0 if forwards else -1.0
         self.counts[steps.EXCESS] = self.excess
@@ -152,7 +152,7 @@ class Fixed(ResumableRun):
         return Status(int(self.counts[steps.STATUS]))
 
     def _scratch(self, constants: Doubles, rows: Doubles) -> list[Any]:
-        return [constants, self.inverses, rows, self.sums, self.places, self.seen]
+        return [constants, self.inverses, rows, self.sums, self.starts, self.seen]
 
     def sample(self, time: Fraction) -> tuple[Fraction, ...] | None:
         length = self.time - self._began
@@ -271,7 +271,7 @@ class Fixed(ResumableRun):
         left = rows_of(self.grid).left
         return state_of_left([left(self.rows, self.grid, self.vectors, n, v) for v in range(self.vectors)])
 
-    def place(self) -> tuple[str, ...]:
+    def resume_words(self) -> tuple[str, ...]:
         length = Fraction(float(self.clock[steps.TIME])) - Fraction(float(self.clock[steps.BEGAN]))
         halvings = length.denominator.bit_length() - length.numerator.bit_length()
         words = (self.clock[steps.BEGAN], *self._before())

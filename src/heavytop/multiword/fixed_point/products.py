@@ -35,19 +35,19 @@ from heavytop.multiword.fixed_point.arithmetic import (
 
 @dataclass(frozen=True, slots=True)
 class ProductSize:
-    """Doubles of a row, of all rows and of the sums; integers of the places."""
+    """Doubles of a row, of all rows and of the sums; integers of the starts."""
 
     row: int
     rows: int
     sums: int
-    places: int
+    starts: int
 
 
 @dataclass(slots=True)
 class Rows(ABC):
     """Writes code that stores the coefficients y_n of ``vectors`` state vectors, K words each, and sums their products.
 
-    orders: the capacity.  rows, sums, places, seen: scratch of :meth:`size`, initially zeros.
+    orders: the capacity.  rows, sums, starts, seen: scratch of :meth:`size`, initially zeros.
     """
 
     code: Code
@@ -56,7 +56,7 @@ class Rows(ABC):
     orders: int
     rows: Operand
     sums: Operand
-    places: Operand
+    starts: Operand
     seen: Operand
     kernels: list[ir.Function]
 
@@ -297,7 +297,7 @@ def digits_of(grid: Grid) -> int:
 
 
 class DigitRows(Rows):
-    """A row: two zeros, the digits of R, those of each L.  places: z(n) and, behind, where digit z(n) of the first L is
+    """A row: two zeros, the digits of R, those of each L.  starts: z(n) and, behind, where digit z(n) of the first L is
     from the first digit of order 0 on.
     """
 
@@ -354,18 +354,18 @@ class DigitRows(Rows):
         size = self.largest_sum(y).bits()
         exponent = size.unsigned_shift(52) - 1023
         z = code.smaller(code.larger(_HEAD - 4 - exponent, 0) // BITS, count - 1)
-        self._put_place(n, z)
+        self._put_start(n, z)
         return y, code.larger(z, zeros), wide
 
-    def _put_place(self, n: Index, z: Operand) -> None:
+    def _put_start(self, n: Index, z: Operand) -> None:
         code = self.code
         row = self.size(self.grid, self.vectors, 1).row
-        code.store_one(z, self.places, n)
+        code.store_one(z, self.starts, n)
         code.store_one(code.integer(n) * row + z * LANES, self._where, n)
 
     @property
     def _where(self) -> Operand:
-        return self.code.address(self.places, self.orders)
+        return self.code.address(self.starts, self.orders)
 
     def products(self, n: Operand, zeros: Operand, vector: int) -> list[Operand]:
         code, count = self.code, digits_of(self.grid)
@@ -397,7 +397,7 @@ class DigitRows(Rows):
         half = (n >> 1) + 1
 
         def lower(m: Operand, values: list[Operand]) -> list[Operand]:
-            zeros_left, zeros_right = (code.load_one(self.places, k) for k in (m, n - m))
+            zeros_left, zeros_right = (code.load_one(self.starts, k) for k in (m, n - m))
             return [code.smaller(values[0], zeros_left + zeros_right)]
 
         level = code.loop(0, half, lower, [code.integer(digits_of(self.grid))])[0]
@@ -407,7 +407,7 @@ class DigitRows(Rows):
         b.position_at_end(again)
 
         def clip(m: Operand, _: list[Operand]) -> None:
-            self._put_place(m, code.smaller(code.load_one(self.places, m), limit))
+            self._put_start(m, code.smaller(code.load_one(self.starts, m), limit))
 
         code.loop(0, n + 1, clip, [])
         code.add_incoming([largest], [limit])
@@ -422,21 +422,21 @@ class DigitRows(Rows):
         for k, word in enumerate(words):
             remainder = _times(code, word, _raised(grid))
             for j in range(max(0, (_HEAD + grid.bits * k + BITS - 2) // BITS - 1), count):
-                exact = self._place(j) <= -grid.bits * (k + 1) and k + 1 < grid.words
-                piece = remainder if exact else rounded(code, remainder, self._place(j) + _raised(grid))
+                exact = self._exponent(j) <= -grid.bits * (k + 1) and k + 1 < grid.words
+                piece = remainder if exact else rounded(code, remainder, self._exponent(j) + _raised(grid))
                 digits[j] = piece if digits[j] is None else digits[j] + piece
                 if exact:
                     break
                 remainder -= piece
-        carries = [None, *(rounded(code, d, self._place(j) + _raised(grid)) for j, d in enumerate(digits[1:])), None]
+        carries = [None, *(rounded(code, d, self._exponent(j) + _raised(grid)) for j, d in enumerate(digits[1:])), None]
         carried = [self._carried(*three) for three in zip(digits, carries, carries[1:], strict=False)]
-        return [_times(code, digit, -self._place(j) - _raised(grid)) for j, digit in enumerate(carried)]
+        return [_times(code, digit, -self._exponent(j) - _raised(grid)) for j, digit in enumerate(carried)]
 
     def _carried(self, digit: Operand, out: Operand | None, into: Operand | None) -> Operand:
         value = digit if out is None else digit - out
         return value if into is None else value + into
 
-    def _place(self, j: int) -> int:
+    def _exponent(self, j: int) -> int:
         """log2 u_j."""
         return _HEAD - BITS * (j + 1)
 
@@ -479,7 +479,7 @@ _FAR = 1 << 40
 
 
 class WordRows(Rows):
-    """A row: R, then L of each vector, K words each.  places: from which order on u leading words are 0."""
+    """A row: R, then L of each vector, K words each.  starts: from which order on u leading words are 0."""
 
     @staticmethod
     def size(grid: Grid, vectors: int, orders: int) -> ProductSize:
@@ -503,9 +503,9 @@ class WordRows(Rows):
 
     def begin(self, y: list[Operand], wide: Operand) -> Operand:
         self._put(0, y)
-        self.code.store_one(0, self.places, 0)
+        self.code.store_one(0, self.starts, 0)
         for k in range(1, self.grid.words + 2):
-            self.code.store_one(_FAR, self.places, k)
+            self.code.store_one(_FAR, self.starts, k)
         return wide
 
     def keep(self, n: Index, y: list[Operand], zeros: Operand, wide: Operand) -> tuple[list[Operand], Operand, Operand]:
@@ -513,7 +513,7 @@ class WordRows(Rows):
         zeros_after = self._leading_zeros(y, zeros)
 
         def begin(k: Operand, _: list[Operand]) -> None:
-            code.store_one(n, self.places, k + 1)
+            code.store_one(n, self.starts, k + 1)
 
         # several at once where the first order is far smaller than the state
         code.loop(zeros, zeros_after, begin, [])
@@ -549,7 +549,7 @@ class WordRows(Rows):
         row = self.size(self.grid, self.vectors, 1).row
 
         def offset(rows: WordRows, k: Operand) -> Operand:
-            return code.load_one(rows.places, k)
+            return code.load_one(rows.starts, k)
 
         def left(u: Operand, _: list[Operand]) -> None:
             begin, end = offset(lefts[0], u), offset(lefts[0], u + 1)

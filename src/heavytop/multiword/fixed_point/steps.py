@@ -71,12 +71,12 @@ def most_orders(grid: Grid) -> int:
 
 @dataclass(slots=True)
 class SeriesCode:
-    """Writes ``series(state, constants, inverses, rows, sums, places, seen, factor, raises, result)``.
+    """Writes ``series(state, constants, inverses, rows, sums, starts, seen, factor, raises, result)``.
 
     state, result: K words of each vector.  constants: K words of A and each B (or of those of
     :attr:`heavytop.multiword.codegen.recurrence.Coefficients.paired`, where the grid is bounded), for each vector.
     inverses: 1/(n + 1).
-    rows, sums, places, seen: scratch, see :class:`heavytop.multiword.fixed_point.products.Rows`.
+    rows, sums, starts, seen: scratch, see :class:`heavytop.multiword.fixed_point.products.Rows`.
     factor, raises: from one order to the next coefficients are multiplied by factor 16^raises; factor is ± a power of
     two, at most 1.
     wide: as :attr:`heavytop.multiword.codegen.machine_code.Processor.wide`; results are the same.
@@ -98,11 +98,11 @@ class SeriesCode:
         kernels = kind.write_kernels(self.module, self.grid, row, self.wide)
         arguments = [POINTER] * 5 + [INT_POINTER, POINTER, DOUBLE, INT, POINTER]
         made, self.code = function(self.module, "series", INT, arguments)
-        state, _, _, rows, sums, places, seen, _, _, result = self.code.arguments
+        state, _, _, rows, sums, starts, seen, _, _, result = self.code.arguments
         code, b = self.code, self.code.builder
         words = self.grid.words
         y = [code.load(state, 8 * k) for k in range(words * self.vectors)]
-        self.rows = kind(code, self.grid, self.vectors, room, rows, sums, places, seen, kernels)
+        self.rows = kind(code, self.grid, self.vectors, room, rows, sums, starts, seen, kernels)
         code.store(code.zero, seen, 0)
         orders, small, wide, total = self._orders(y)
         bits = code.any_bit(code.load(seen, 0).bits()) & EXPONENT_BITS
@@ -306,9 +306,9 @@ def write_samples(module: ir.Module, grid: Grid, vectors: int) -> ir.Function:
 
     def several(block: Operand, _: list[Operand]) -> None:
         begin = first + block * count
-        places = [code.smaller(begin + i, last - 1) for i in range(count)]
-        starts = [code.address(at, offset * words) for offset in places]
-        x = [[code.spread(code.load_one(start, k)) for k in range(words)] for start in starts]
+        samples = [code.smaller(begin + i, last - 1) for i in range(count)]
+        addresses = [code.address(at, offset * words) for offset in samples]
+        x = [[code.spread(code.load_one(start, k)) for k in range(words)] for start in addresses]
 
         def term(zeros: int, k: Operand, values: list[Operand]) -> list[Operand]:
             rows, results = [stored.stored(order - k, v) for v in range(vectors)], []
@@ -333,7 +333,7 @@ def write_samples(module: ir.Module, grid: Grid, vectors: int) -> ir.Function:
         for zeros in reversed(range(0, words, -(-words // _PARTS))):
             holds = partial(vanish, zeros) if zeros else None
             k, values = code.loop_while(k, order + 1, holds, partial(term, zeros), values)
-        for i, offset in enumerate(places):
+        for i, offset in enumerate(samples):
             row = code.address(result, offset * (8 * width))
             for index, value in enumerate(values[width * i : width * (i + 1)]):
                 code.store(value, row, 8 * index)
@@ -366,7 +366,7 @@ def build(
     """``series`` for this system and, with ``stepping``, ``advance``, ``follow`` and ``samples``; a relative grid has
     ``series`` alone.
 
-    advance(state, constants, inverses, rows, sums, places, seen, result, clock, counts, steps): at most so many steps,
+    advance(state, constants, inverses, rows, sums, starts, seen, result, clock, counts, steps): at most so many steps,
     until the time reaches the target; returns their number.  The state before the last step follows the result.
     follow(those of advance but steps, times, at, progress, count, steps, samples): steps, and ``samples`` of the times
     that they cover, doubles > 0, up to the last time or so many steps.  at: room for the K words of each.

@@ -261,7 +261,7 @@ class IntegerMotion(ResumableRun):
     def coefficients(self, n: int) -> tuple[Fraction, ...]:
         return self._exact([component[n] for component in self._series])
 
-    def place(self) -> tuple[str, ...]:
+    def resume_words(self) -> tuple[str, ...]:
         before = (component[0] for component in self._series)
         return (str(self._taken), str(self._began), *(f"{int(value):x}" for value in before))
 
