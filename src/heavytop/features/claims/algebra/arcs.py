@@ -1,9 +1,9 @@
-"""Sums of inverse functions that are a multiple of π all over a region, 4 atan(1/5) − atan(1/239) = π/4; of logarithms.
+"""Relations between inverse functions, such as 4 atan(1/5) − atan(1/239) = π/4, and between logarithms.
 
-A relation with small integers is proposed from values at samples (lattice reduction) and then proven: the product of
-the unit vectors with these angles, turned back by the multiple of π, has no imaginary part, by exact algebra; so the
-sum less that multiple is a multiple of π at each point.  It is 0 at all points where it is less than π by the ranges of
-the functions, or where it is continuous on a connected domain and less than π at one point, or where it is a number.
+A relation with small integers is proposed from values at samples (lattice reduction) and then proven.  By exact algebra
+the product of the unit vectors with these angles, rotated by minus the multiple of π, is real; so the sum less that
+multiple is a multiple of π at each point.  It is 0 where the ranges of the functions bound it by π, or where it is less
+than π at one point of a connected domain on which it is continuous, or where it is a number less than π.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from flint import arb, fmpq_mpoly, fmpz_mat
 from heavytop.exact.flint.balls import working_precision
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Field, Regularity
-from heavytop.features.claims.algebra.functions import INVERSE, turned
+from heavytop.features.claims.algebra.functions import INVERSE, circle_of_sum
 from heavytop.features.claims.algebra.ring import Unprovable, used
 from heavytop.features.claims.algebra.signs import NUMBER_BITS
 from heavytop.features.claims.algebra.statement import Point
@@ -35,10 +35,10 @@ _SAMPLES = 3
 
 @dataclass(eq=False)
 class Arcs:
-    """The relations between the inverse functions in a field over a region, found as they are asked for.
+    """The relations between the inverse functions of a field over a region.
 
-    everywhere: what is regular all over the region.  points: some of it.  is_connected: whether it is, as far as the
-    symbols in these generators go.
+    everywhere: regularity on the whole region.  points: of the region.  is_connected: whether the domain of the symbols
+    in these generators is.
     """
 
     _field: Field
@@ -50,7 +50,7 @@ class Arcs:
     _forms: dict[int, fmpq_mpoly] = dataclass_field(default_factory=dict)
 
     def without(self, p: fmpq_mpoly) -> fmpq_mpoly:
-        """A polynomial that is ``p`` all over the region, in fewer inverse functions."""
+        """A polynomial equal to ``p`` on the whole region, in fewer inverse functions."""
         tower = self._field.tower
         self._look_for_more()
         for index in used(p) & self._forms.keys():
@@ -72,24 +72,24 @@ class Arcs:
                     self._forms[index] = form
 
     def _form_of(self, index: int) -> fmpq_mpoly | None:
-        """A function through those of its kind before it, an arc also through π; None without such a relation."""
+        """A function as a combination of earlier ones of its kind, and of π for an arc; None without a relation."""
         tower = self._field.tower
         is_log = tower.generators[index].kind == "log"
-        alike = [other for other in self._free if (tower.generators[other].kind == "log") is is_log]
+        earlier = [arc for arc in self._free if (tower.generators[arc].kind == "log") is is_log]
         pi = [] if is_log else [*used(self._field.enter(sympy.pi).numerator)]
-        factors = _integer_relation([self._values(arc) for arc in (*alike, index, *pi)])
-        if factors is None or not factors[len(alike)]:
+        factors = _integer_relation([self._values(arc) for arc in (*earlier, index, *pi)])
+        if factors is None or not factors[len(earlier)]:
             return None
-        weights = {arc: factor for arc, factor in zip((*alike, index), factors, strict=False) if factor}
+        weights = {arc: factor for arc, factor in zip((*earlier, index), factors, strict=False) if factor}
         if not (self._is_power_product_one(weights) if is_log else self._is_proven(weights, -factors[-1])):
             return None
-        others = {arc: factor for arc, factor in weights.items() if arc != index}
-        others |= dict.fromkeys(pi, factors[-1])
-        total = sum((tower.gens[arc] * factor for arc, factor in others.items()), tower.context.constant(0))
-        return total / -weights[index]
+        leading = weights.pop(index)
+        weights |= dict.fromkeys(pi, factors[-1])
+        total = sum((tower.gens[arc] * factor for arc, factor in weights.items()), tower.context.constant(0))
+        return total / -leading
 
     def _is_power_product_one(self, weights: dict[int, int]) -> bool:
-        """Whether the product of these powers of what logarithms are taken of is 1."""
+        """Whether the product of these powers of the arguments is 1."""
         tower = self._field.tower
         if sum(map(abs, weights.values())) > _MOST_TURNS:
             return False
@@ -97,25 +97,25 @@ class Arcs:
         return prod(parts, start=tower.number(1)) == tower.number(1)
 
     def _values(self, index: int) -> list[arb]:
-        """Its values at a few sample points of the region; of a number, the number."""
+        """The values of a generator at a few sample points of the region; of a number, the number."""
         field = self._field
         if index in field.tower.signs.numbers:
             return [field.tower.signs.numbers[index]] * _SAMPLES
         points = self._points[:_SAMPLES]
         if not points:
-            raise Unprovable("No place to look at.")
+            raise Unprovable("The region has no sample point.")
         try:
             values = [evaluate(field.meaning(index), point, NUMBER_BITS) for point in points]
         except KeyError:
-            raise Unprovable("No value at a place.") from None
+            raise Unprovable("No value at a sample point.") from None
         if not all(value.is_finite() for value in values):
-            raise Unprovable("No value at a place.")
+            raise Unprovable("No value at a sample point.")
         return [values[i % len(values)] for i in range(_SAMPLES)]
 
     # --- proofs -------------------------------------------------------------------------------------------------------
 
     def _is_proven(self, weights: dict[int, int], turns: int) -> bool:
-        """Σ weight · arc = turns · π all over the region."""
+        """Whether Σ weight · arc = turns · π is proven on the whole region."""
         common = gcd(*weights.values())
         multiple = next(
             h for h in range(1, common + 1) if common % h == 0 and 12 % Fraction(h * turns, common).denominator == 0
@@ -137,7 +137,7 @@ class Arcs:
         for arc, weight in weights.items():
             sine, cosine = field.transcendental.direction(arc)
             for _ in range(abs(weight)):
-                total = turned(total, (sine if weight > 0 else -sine, cosine))
+                total = circle_of_sum(total, (sine if weight > 0 else -sine, cosine))
         return not total[0].numerator
 
     def _is_small_by_ranges(self, weights: dict[int, int], angle: Fraction) -> bool:
@@ -146,14 +146,14 @@ class Arcs:
         inside = False
         for arc, weight in weights.items():
             g = self._field.tower.generators[arc]
-            least, most = self._ends(arc)
-            low, high = low + min(weight * least, weight * most), high + max(weight * least, weight * most)
+            ends = [weight * end for end in self._ends(arc)]
+            low, high = low + min(ends), high + max(ends)
             inside = inside or (g.kind == "atan" and g.strict)
         size = max(-low, high)
         return size < 1 or (inside and size == 1)
 
     def _ends(self, index: int) -> tuple[Fraction, Fraction]:
-        """A closed interval of the values of an inverse function, over π."""
+        """A closed interval of the values of an inverse function, in units of π."""
         tower = self._field.tower
         g, half = tower.generators[index], Fraction(1, 2)
         if g.kind == "acos":
@@ -163,7 +163,7 @@ class Arcs:
         return Fraction(0) if g.sign > 0 else -size, Fraction(0) if g.sign < 0 else size
 
     def _is_small_somewhere(self, weights: dict[int, int], angle: Fraction) -> bool:
-        """|Σ weight · arc − angle · π| < π: of numbers, or at a place where it is continuous on a connected domain."""
+        """|Σ weight · arc − angle · π| < π: of numbers, or at a point of a connected domain where it is continuous."""
         arcs = set(weights)
         if not arcs <= self._field.tower.signs.numbers.keys() and (
             not self._is_connected(arcs) or self._everywhere.obstacle_of_generators(arcs, analytic=False)
@@ -176,7 +176,7 @@ class Arcs:
 
 
 def _integer_relation(values: Sequence[Sequence[arb]]) -> list[int] | None:
-    """Small integers with which the values add up to 0, in each of their components, as far as can be seen."""
+    """Small integers with which the values add up to 0 in each component, within rounding; None without any."""
     with working_precision(NUMBER_BITS):
         matrix = [[(value.mid() * 2**_BITS).floor().unique_fmpz() for value in row] for row in values]
     if any(value is None for row in matrix for value in row):  # not finite, or too large to be told

@@ -1,10 +1,10 @@
-"""Elliptic functions and integrals as formulas of a claim: the derivative of each, which is its algebra, and its value.
+"""Elliptic functions and integrals in formulas of claims: their derivatives, which are their algebra, and values.
 
 Jacobi's functions of a real argument u and a parameter m = k², 0 ≤ m ≤ 1 (DLMF 22.6.1, 22.13.1):
 
     sn² + cn² = 1,   dn² + m sn² = 1,   dn > 0,   sn' = cn dn,   cn' = −sn dn,   dn' = −m sn cn
 
-Each other is a free generator over those that its derivative holds, constant parameters beside it:
+Every other function is a free generator over those in its derivative, with constant parameters:
 
     am' = dn,   ellipticF' = 1/Δ,   ellipticE' = Δ,   ellipticPi' = 1/((1 − n sin²φ) Δ),   Δ = √(1 − m sin²φ)
     thetan' = thetan Z,   Z(u) = E(am u) − u E/K          (Neville's θn = Θ(u)/Θ(0); DLMF 20.1, 22.16.32)
@@ -31,16 +31,16 @@ from heavytop.exact.flint.balls import nearest_integer
 
 
 class Analytic(sympy.Function):  # type: ignore[misc]
-    """A real function of one argument that may move; the others have no rate here: they move in no proven claim.
+    """A real function with one moving argument; its other arguments have no rate, and are constant in proven claims.
 
-    moving: its number.  parity: 1 or −1 where it is even or odd in it; 0 is not used.
+    moving: the number of that argument.  parity: 1 or −1 where it is even or odd in it, else 0.
     """
 
     is_real = True
     moving, parity = 1, 0
 
     def fdiff(self, argindex: int = 1) -> sympy.Expr:
-        """The derivative by the argument that may move."""
+        """The derivative by the moving argument."""
         name = type(self).__name__
         if argindex != self.moving:
             return sympy.Function(f"rate_of_{name}_by_{argindex}", real=True)(*self.args)
@@ -48,7 +48,7 @@ class Analytic(sympy.Function):  # type: ignore[misc]
 
     @classmethod
     def eval(cls, *arguments: sympy.Expr) -> sympy.Expr | None:
-        """Values at 0, at −u, at m = 0 and 1, and as the inverse of another function."""
+        """Simpler values: at u = 0 and −u, at m = 0 and 1, and of an inverse function."""
         last = cls.moving - 1
         u, m = arguments[last], arguments[-1]
         if cls.parity and u.could_extract_minus_sign():
@@ -85,7 +85,7 @@ _DEGENERATE: dict[str, dict[int, Callable[[sympy.Expr], sympy.Expr]]] = {
     "ellipticE": {0: lambda u: u},
     "thetan": {0: lambda u: sympy.Integer(1)},
 }
-"""Values where m = 0 or 1, in simpler functions."""
+"""The functions for m = 0 and 1."""
 
 
 class modulus(sympy.Function):  # type: ignore[misc]  # noqa: N801
@@ -126,7 +126,7 @@ _RATES: dict[str, Callable[..., sympy.Expr]] = {
 }
 
 
-# --- through others ---------------------------------------------------------------------------------------------------
+# --- formulas in these functions --------------------------------------------------------------------------------------
 
 
 def quarter(m: sympy.Expr) -> sympy.Expr:
@@ -146,9 +146,9 @@ def zeta_of_jacobi(u: sympy.Expr, m: sympy.Expr) -> sympy.Expr:
 
 def jacobi_theta(index: int, u: sympy.Expr, m: sympy.Expr) -> sympy.Expr:
     """θ1, ..., θ4 at π u/(2K), of the nome of m: H, H1, Θ1, Θ."""
-    k, other = sympy.sqrt(m), sympy.sqrt(1 - m)
-    factors = {1: sympy.sqrt(k) * sn(u, m), 2: sympy.sqrt(k / other) * cn(u, m), 3: dn(u, m) / sympy.sqrt(other), 4: 1}
-    return sympy.sqrt(2 * other * quarter(m) / sympy.pi) * factors[index] * thetan(u, m)
+    k, k1 = sympy.sqrt(m), sympy.sqrt(1 - m)
+    factors = {1: sympy.sqrt(k) * sn(u, m), 2: sympy.sqrt(k / k1) * cn(u, m), 3: dn(u, m) / sympy.sqrt(k1), 4: 1}
+    return sympy.sqrt(2 * k1 * quarter(m) / sympy.pi) * factors[index] * thetan(u, m)
 
 
 def theta(index: int, z: sympy.Expr, q: sympy.Expr) -> sympy.Expr:
@@ -182,9 +182,9 @@ FORMULAS: dict[str, tuple[Any, int]] = {
     "thetaRate": (theta_rate, 2),
     "thetaArgument": (theta_argument, 3),
 }
-"""Functions that formulas may call, with the number of its arguments."""
+"""Functions that formulas may call, with the numbers of their arguments."""
 FREE = {function.__name__: function for function in (*_OF_ANGLE, third, thetan, modulus, *_TOWERS[-4:])}
-"""Functions that are free generators; those of ℘ have a relation."""
+"""Functions that are free generators."""
 WEIERSTRASS = {function.__name__: function for function in (wp, wpprime, wp3, wp3prime, wpinverse)}
 
 
@@ -260,4 +260,4 @@ VALUES: dict[str, Callable[..., arb]] = {
     ),
     **{name: partial(_of_lattice, name) for name in (*WEIERSTRASS, "wzeta", "wsigma", "wzeta3", "wsigma3")},
 }
-"""Each function of balls, as a ball that is proven to hold it, at the working precision."""
+"""The functions of balls, at the working precision: each result contains the true values."""

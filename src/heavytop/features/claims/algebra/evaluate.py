@@ -1,4 +1,4 @@
-"""An expression at exact parameters and an exact time, as a ball."""
+"""The value of an expression at exact parameters and an exact time, as a ball."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def evaluate(expression: sympy.Expr, values: Mapping[sympy.Symbol, Fraction], bi
 
     def compute(e: sympy.Expr) -> Any:
         if e.is_Rational:
-            return ball(Fraction(int(e.p), int(e.q)))
+            return ball(Fraction(e))
         if isinstance(e, Defined):
             return visit(e.meaning)
         if e.is_Symbol:
@@ -76,13 +76,13 @@ def _power(base: arb, exponent: sympy.Expr) -> arb:
     if exponent.is_Rational and exponent.q in (1, 2, 4):
         for _ in range(int(exponent.q) // 2):
             base = base.sqrt()
-        power = _whole_power(base, abs(int(exponent.p)))
+        power = _integer_power(base, abs(int(exponent.p)))
         return power if exponent.p > 0 else 1 / power
     raise Unprovable(f"A power must be a multiple of 1/4; got {exponent}.")
 
 
-def _whole_power(base: arb, exponent: int) -> arb:
-    """By squaring: python-flint's power of a ball with midpoint 0 is nan."""
+def _integer_power(base: arb, exponent: int) -> arb:
+    """A power by squaring: python-flint's power of a ball with midpoint 0 is nan."""
     result, square = arb(1), base
     while exponent:
         if exponent & 1:

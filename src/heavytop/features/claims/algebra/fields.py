@@ -1,9 +1,9 @@
-"""From an expression in the variable and the parameters to a quotient in a
+"""Expressions in the variable and the parameters as quotients in a
 :class:`~heavytop.features.claims.algebra.rational.Tower`.
 
 Exponentials, hyperbolic and circular functions of commensurable arguments become powers of one generator each, roots
-become generators with a relation, what is left (inverse functions, logarithms) becomes a free generator.  Derivatives
-are taken on the expression before.  Reduction to 0 is a proof; anything else proves nothing.
+generators with a relation, other functions (inverse functions, logarithms) free generators.  Derivatives are those of
+the expressions.  Reduction to 0 is a proof; any other result proves nothing.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from heavytop.features.claims.algebra.elliptic import FREE, JACOBI, WEIERSTRASS
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.functions import INVERSE, Refine, Transcendental
 from heavytop.features.claims.algebra.rational import Tower, forces_zero
-from heavytop.features.claims.algebra.ring import Generator, Quotient, Unprovable, used, where_provable
-from heavytop.features.claims.algebra.signs import NUMBER_BITS, UNKNOWN, Sign
+from heavytop.features.claims.algebra.ring import Generator, Quotient, Unprovable, as_fraction, used, where_provable
+from heavytop.features.claims.algebra.signs import NUMBER_BITS, PLUS, UNKNOWN, Sign
 from heavytop.features.claims.algebra.structure import Defined
 
 _MAX_EXPONENT = 64
@@ -32,9 +32,9 @@ _HYPERBOLIC = ("tanh", "sech", "sinh", "cosh", "coth", "csch")
 
 @dataclass(frozen=True, slots=True)
 class SolvedRelation:
-    """A relation between parameters, solved: symbol = value holds at exactly the points where ``relation`` is 0.
+    """A solved relation between parameters: symbol = value holds at exactly the points where ``relation`` is 0.
 
-    radicand: where the value is a root ±√radicand, what is under it; it is > 0.
+    radicand: of a value ±√radicand; it is > 0.
     """
 
     symbol: sympy.Symbol
@@ -50,8 +50,8 @@ class Assumptions:
     positive: symbols > 0.  greater: pairs (symbol, expression) with symbol > expression.
     variable: the symbol that moves.  variable_sign: its sign on the domain, 0 for both; strict: it is not 0 there.
     relations: expressions that are 0.  facts: expressions that are > 0.  nonzero: symbols that are not 0.
-    ranges: closed intervals of symbols.  weak: expressions that are >= 0.  solved: symbols that are put in through
-    others, in this order.  parameters: symbols that are constant along every motion.
+    ranges: closed intervals of symbols.  weak: expressions that are >= 0.  solved: symbols that are eliminated, in this
+    order.  parameters: symbols that are constant along every motion.
     """
 
     variable: sympy.Symbol
@@ -68,17 +68,17 @@ class Assumptions:
     parameters: frozenset[sympy.Symbol] = frozenset()
 
     def bounds(self) -> list[sympy.Expr]:
-        """Expressions that are > 0 or >= 0, in the symbols that are not solved."""
+        """Expressions that are > 0 or >= 0, without the solved symbols."""
         solved = {solution.symbol for solution in self.solved}
-        greater = [symbol - bound for symbol, bound in self.greater]
-        conditions = [*self.facts, *self.weak, *greater, *solved.intersection(self.positive)]
+        bounds = [*self.facts, *self.weak, *(symbol - bound for symbol, bound in self.greater)]
+        bounds += solved.intersection(self.positive)
         for solution in self.solved:
-            conditions = [bound.xreplace({solution.symbol: solution.value}) for bound in conditions]
-        return conditions
+            bounds = [bound.xreplace({solution.symbol: solution.value}) for bound in bounds]
+        return bounds
 
 
 class Field:
-    """The field that a set of expressions lives in.  Raises Unprovable for what it cannot carry."""
+    """The field of a set of expressions.  Raises Unprovable for an expression beyond the algebra."""
 
     def __init__(self, assumptions: Assumptions, expressions: Iterable[sympy.Expr]) -> None:
         self.assumptions = assumptions
@@ -106,7 +106,7 @@ class Field:
         self._ranges = {symbol: ends for symbol, ends in a.ranges if symbol not in solved}
         for symbol in a.positive:
             if symbol != a.variable and symbol not in solved:
-                self._add(symbol, sign=Sign(1, True))
+                self._add(symbol, sign=PLUS)
         if a.variable not in self._known:
             self._add(a.variable, constant=False, sign=Sign(a.variable_sign, a.strict))
         for symbol in a.nonzero:
@@ -122,7 +122,7 @@ class Field:
         for fact, strict in facts:
             if not fact.free_symbols & solved:
                 self.tower.declare(self.enter(fact), strict=strict)
-        # the last solution holds none of the symbols that are solved before it
+        # the last solution contains none of the symbols that are solved before it
         for solution in reversed(a.solved):
             if solution.radicand is not None:
                 self.tower.declare(self.enter(solution.radicand))
@@ -132,12 +132,12 @@ class Field:
                 self.tower.declare(self.enter(fact), strict=strict)
 
     def _declare_greater(self, symbol: sympy.Symbol, bound: sympy.Expr) -> None:
-        """symbol = bound + excess."""
-        floor = self.enter(bound)
+        """Assumes symbol = bound + excess with a generator excess > 0."""
+        lower = self.enter(bound)
         index = used(self.enter(symbol).numerator).pop()
-        if floor.denominator == self.tower.one and self.tower.signs.can_have_form(index, floor.numerator):
+        if lower.denominator == self.tower.one and self.tower.signs.can_have_form(index, lower.numerator):
             excess = self.tower.add(Generator(f"{symbol} - ({bound})", constant=True, sign=1, strict=True))
-            self.tower.signs.declare_form(index, floor.numerator + self.tower.gens[excess])
+            self.tower.signs.declare_form(index, lower.numerator + self.tower.gens[excess])
         else:
             self.tower.declare(self.enter(symbol - bound))
 
@@ -149,7 +149,7 @@ class Field:
         return index
 
     def enter(self, expression: sympy.Expr) -> Quotient:
-        """The expression in this field; raises Unprovable for what it cannot carry."""
+        """The expression in this field; raises Unprovable for an expression beyond the algebra."""
         if expression not in self._known:
             try:
                 self._known[expression] = self._enter(expression)
@@ -160,42 +160,42 @@ class Field:
         return self._known[expression]
 
     def is_zero(self, expression: sympy.Expr) -> bool:
-        """True only where the expression is proven to be 0 wherever no divisor of the tower is."""
+        """True only where the expression is proven to be 0 off the zeros of the tower's divisors."""
         return self.vanishes(expression) or self.is_forced(expression, radical=True)
 
     @where_provable(False)
     def vanishes(self, expression: sympy.Expr) -> bool:
-        """True only where the expression reduces to 0, whatever the relations of the claim say."""
+        """True only where the expression reduces to 0, without the relations of the claim."""
         return not bool(self.enter(expression).numerator)
 
     @where_provable(False)
     def is_forced(self, expression: sympy.Expr, *, radical: bool, simpler: Callable[[Any], Any] = lambda p: p) -> bool:
-        """The relations of the claim force it to be 0: it is their combination with factors of this field.
+        """True only where the expression is a combination of the claim's relations with factors of this field.
 
-        radical: a power of it is, which proves as much at each point, but not that the flow keeps a relation.
-        simpler: the same polynomial where more is known of its generators.
+        radical: or where a power of it is one, which proves that it is 0, but not that the flow keeps a relation.
+        simpler: a simplification of its numerator.
         """
         return self._forces([], simpler(self.enter(expression).numerator), radical=radical)
 
     @where_provable(False)
     def never_zero_on_relations(self, *zeros: fmpq_mpoly) -> bool:
-        """True only where the relations of the claim exclude each other and that these polynomials are 0."""
+        """True only where the relations of the claim exclude that these polynomials are 0."""
         return self._forces(list(zeros), self.tower.one, radical=False)
 
     def _forces(self, zeros: list[fmpq_mpoly], p: fmpq_mpoly, *, radical: bool) -> bool:
-        """The relations of the claim and ``zeros`` do, also where a factor that is never 0 has to be divided out."""
+        """Whether the relations of the claim and ``zeros`` force ``p``, factors that are never 0 divided out."""
         relations = [*(self.enter(relation).numerator for relation in self.assumptions.relations), *zeros]
         if not self.assumptions.relations:
             return False
         roots = self.tower.relations()
         if forces_zero([*relations, *roots], p, radical=radical):
             return True
-        # what stays positive along a motion may be 0 on another
+        # a function of the state that stays positive along one motion may be 0 on another
         names = self.assumptions.parameters.union(self.assumptions.positive)
         never_zero = [q for q in self.tower.signs.never_zero(relations) if self.symbols(q) <= names]
         if never_zero and forces_zero([*relations, *roots], p, radical=radical, never_zero=never_zero):
             return True
-        # a parameter, in a relation between parameters, is 0 or it is not
+        # by cases: a parameter of the relations is 0, or it is not
         indices = set().union(*(used(relation) for relation in relations if self._is_of_parameters(relation)))
         return any(
             forces_zero([*relations, *roots], p, radical=radical, never_zero=[*never_zero, self.tower.gens[index]])
@@ -214,24 +214,24 @@ class Field:
         return all(generators[i].kind == "symbol" and generators[i].meaning in names for i in used(p))
 
     def _where_zero(self, relations: list[fmpq_mpoly], index: int) -> list[fmpq_mpoly]:
-        """The relations where a parameter is 0; those between parameters without powers and what is never 0."""
+        """The relations where a parameter is 0; those between parameters square-free, without factors never 0."""
         signs, zero = self.tower.signs, self.tower.context.constant(0)
         zeros = [self.tower.gens[index]]
         for relation in relations:
             if self._is_of_parameters(relation):
-                left = self.tower.by_power(relation, index).get(0, zero)
-                factors = (factor for factor, _ in left.factor()[1] if not signs.of(factor).strict)
-                relation = prod(factors, start=self.tower.one) if left else zero
+                constant = self.tower.by_power(relation, index).get(0, zero)
+                factors = (factor for factor, _ in constant.factor()[1] if not signs.of(factor).strict)
+                relation = prod(factors, start=self.tower.one) if constant else zero
             zeros.append(relation)
         return [relation for relation in zeros if relation]
 
     @where_provable(False)
     def vanishes_on(self, expression: sympy.Expr, zero: sympy.Expr) -> bool:
-        """True only where the expression is a multiple of the polynomial ``zero``, off the divisors of the tower."""
+        """True only where the expression is a multiple of the polynomial ``zero``, off the tower's divisors."""
         return bool(not divmod(self.enter(expression).numerator, self.enter(zero).numerator)[1])
 
     def is_constant(self, value: Quotient) -> bool:
-        """True where only generators that are constant in time are left."""
+        """Whether the quotient has only generators that are constant in time."""
         return all(self.tower.generators[i].constant for i in used(value.numerator) | used(value.denominator))
 
     # --- expressions ------------------------------------------------------------------------------------------------
@@ -239,9 +239,9 @@ class Field:
     def _enter(self, e: sympy.Expr) -> Quotient:
         tower = self.tower
         if e.is_Rational:
-            return tower.number(Fraction(int(e.p), int(e.q)))
+            return tower.number(Fraction(e))
         if e is sympy.pi:
-            index = self._add(e, sign=Sign(1, True), kind="number")
+            index = self._add(e, sign=PLUS, kind="number")
             tower.signs.numbers[index] = evaluate(e, {}, NUMBER_BITS)
             tower.signs.pi = index
             return self._known[e]
@@ -261,7 +261,7 @@ class Field:
         return self._function(type(e).__name__, [self.enter(part) for part in e.args])
 
     def _definition(self, e: Defined) -> Quotient:
-        """The meaning of a name; where that is too large, a free generator: what holds for any value holds for it."""
+        """The meaning of a definition; where that is too large, a free generator, whose value may be any."""
         try:
             return self.enter(e.meaning)
         except Unprovable:
@@ -298,16 +298,16 @@ class Field:
             return (root if exponent.q == 2 else self.tower.root(root)) ** int(exponent.p)
         raise Unprovable(f"A power must be a small multiple of 1/4; got {exponent}.")
 
-    # --- and back ---------------------------------------------------------------------------------------------------
+    # --- back to expressions ----------------------------------------------------------------------------------------
 
     def expression(self, value: Quotient) -> sympy.Expr:
-        """The quotient as an expression, in factors."""
+        """The quotient as a product of factors."""
         fraction = sympy.Mul(*_factors(value.numerator), *(1 / factor for factor in _factors(value.denominator)))
         occurring = used(value.numerator) | used(value.denominator)
         return fraction.xreplace({_placeholder(index): self.meaning(index) for index in occurring})
 
     def meaning(self, index: int) -> sympy.Expr:
-        """The meaning of a generator."""
+        """The expression that a generator stands for."""
         g = self.tower.generators[index]
         if g.kind != "root":
             return g.meaning
@@ -321,14 +321,15 @@ def _placeholder(index: int) -> sympy.Symbol:
 
 
 def _factors(p: fmpq_mpoly) -> Iterator[sympy.Expr]:
-    """A number and powers of factors, by FLINT: SymPy may take minutes.  A factor has no content, and its leading
-    coefficient, in SymPy's order, is positive.
+    """A number and powers of primitive factors, by FLINT: SymPy may take minutes.
+
+    The leading coefficient of a factor, in SymPy's order, is positive.
     """
     if not p:
         yield sympy.Integer(0)
         return
     number, factors = p.factor()
-    number = sympy.Rational(int(number.p), int(number.q))
+    number = sympy.Rational(as_fraction(number))
     for factor, power in factors:
         content, part = sympy.Poly(_polynomial(factor), domain="QQ").primitive()
         if part.LC() < 0:
@@ -339,22 +340,22 @@ def _factors(p: fmpq_mpoly) -> Iterator[sympy.Expr]:
 
 
 def _polynomial(p: fmpq_mpoly) -> sympy.Expr:
-    """A polynomial over placeholders, so that nothing is expanded into what they stand for."""
+    """A polynomial in placeholders, which are not expanded."""
     terms = []
     for monomial, coefficient in p.to_dict().items():
         powers = (_placeholder(index) ** int(power) for index, power in enumerate(monomial) if power)
-        terms.append(sympy.Mul(sympy.Rational(int(coefficient.p), int(coefficient.q)), *powers))
+        terms.append(sympy.Mul(sympy.Rational(as_fraction(coefficient)), *powers))
     return sympy.Add(*terms)
 
 
-# Is a quotient of a field real and continuous, or analytic, all over the domain: by the rules of composition.
+# Whether a quotient of a field is real and continuous, or analytic, on the whole domain: by the rules of composition.
 
 
 _SHOWN = 100
 
 
 class Regularity:
-    """Continuity over ``field``.  is_nonzero: whether a polynomial is known to be 0 nowhere on the domain."""
+    """The continuity of quotients of ``field``.  is_nonzero: whether a polynomial is 0 nowhere on the domain."""
 
     def __init__(self, field: Field, is_nonzero: Callable[[Any], bool] | None = None) -> None:
         self._field = field
@@ -362,7 +363,7 @@ class Regularity:
         self._known: dict[tuple[int, bool], str] = {}
 
     def obstacle(self, value: Quotient, *, analytic: bool = False) -> str:
-        """The obstacle to it being real and continuous (analytic) all over the domain; "" where nothing does."""
+        """The obstacle to a proof that the value is real and continuous (analytic) on the domain; "" for none."""
         _, factors = self._field.tower.signs.factors(value.denominator)
         for factor, _ in factors:
             if not self._is_nonzero(factor):
@@ -370,7 +371,7 @@ class Regularity:
         return self.obstacle_of_generators(used(value.numerator) | used(value.denominator), analytic=analytic)
 
     def obstacle_of_generators(self, indices: set[int], *, analytic: bool) -> str:
-        """The obstacle in generators."""
+        """The first obstacle in these generators."""
         for index in sorted(indices):
             if (index, analytic) not in self._known:
                 self._known[index, analytic] = self._obstacle_of(index, analytic)
@@ -390,25 +391,21 @@ class Regularity:
             return f"the definition of {g.meaning} is too large for the algebra"
         if g.kind in ("wp", "wpinverse", "wzeta"):
             return f"{g.meaning} has poles"
-        wanted = "> 0" if analytic else "≥ 0"
-        if g.kind == "root":
-            return self._unless_positive(g.arguments[0], analytic, wanted)
-        if g.kind == "log":
-            return self._unless_positive(g.arguments[0], True, "> 0")
+        if g.kind in ("root", "log"):
+            return self._unless_positive(g.arguments[0], analytic or g.kind == "log")
         if g.kind in ("asin", "acos"):
-            return self._unless_positive(1 - g.arguments[0] * g.arguments[0], analytic, wanted)
+            return self._unless_positive(1 - g.arguments[0] * g.arguments[0], analytic)
         if g.kind == "atan2":
             y, x = g.arguments
-            right = tower.sign(x)
-            off_the_cut = (right.value > 0 and right.strict) or self._is_nonzero(y.numerator)
+            off_the_cut = tower.sign(x) == PLUS or self._is_nonzero(y.numerator)
             return "" if off_the_cut else f"{g.meaning} may jump"
         return ""
 
-    def _unless_positive(self, value: Quotient, strict: bool, wanted: str) -> str:
+    def _unless_positive(self, value: Quotient, strict: bool) -> str:
         sign = self._field.tower.sign(value)
         if sign.value > 0 and (sign.strict or not strict):
             return ""
-        return f"{self._text(value.numerator, value.denominator)} {wanted} is not shown"
+        return f"{self._text(value.numerator, value.denominator)} {'>' if strict else '≥'} 0 is not shown"
 
     @where_provable("an intermediate value")
     def _text(self, numerator: fmpq_mpoly, denominator: Any = None) -> str:

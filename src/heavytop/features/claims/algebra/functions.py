@@ -1,7 +1,7 @@
 """Exponentials, circular functions, logarithms and inverse functions as generators of a tower.
 
-Exponentials and circular functions of commensurable arguments become powers of one generator each; what is left
-(inverse functions, logarithms) becomes a free generator.
+Exponentials and circular functions of commensurable arguments become powers of one generator each; inverse functions
+and logarithms become free generators.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from flint import fmpq_mpoly, fmpz
 from heavytop.features.claims.algebra.elliptic import FREE, WEIERSTRASS, cn, sn, wpinverse
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.rational import Tower
-from heavytop.features.claims.algebra.ring import Generator, Quotient, Unprovable, used
+from heavytop.features.claims.algebra.ring import Generator, Quotient, Unprovable, as_fraction, used
 from heavytop.features.claims.algebra.signs import NUMBER_BITS, PLUS, UNKNOWN, Sign
 
 
 class Expressions(Protocol):
-    """The interface of a field for its generators, which :class:`heavytop.features.claims.algebra.fields.Field` is."""
+    """The interface of a field (:class:`heavytop.features.claims.algebra.fields.Field`) for its generators."""
 
     tower: Tower
 
@@ -49,22 +49,22 @@ _MONOTONE = {"exp": 1, "log": 1, "asin": 1, "atan": 1, "acos": -1}
 _OF_ANGLE = ("am", "ellipticF", "ellipticE", "ellipticPi")
 """Odd functions that increase."""
 _POSITIVE = {"thetan": True, "wsigma3": True, "modulus": False}
-"""Whether it is never 0; where not, it is 0 with its argument alone."""
+"""Functions >= 0, and whether they are never 0; the others are 0 with their argument alone."""
 Circle = tuple[Quotient, Quotient]
 """(sin, cos) of an angle, or a multiple of both."""
 
 
-def turned(a: Circle, b: Circle) -> Circle:
+def circle_of_sum(a: Circle, b: Circle) -> Circle:
     """(sin, cos) of a sum."""
     return a[0] * b[1] + a[1] * b[0], a[1] * b[1] - a[0] * b[0]
 
 
 class Refine(Exception):
-    """A base of exponentials has to be divided: start again."""
+    """A base of exponentials has to be divided, and the field built again."""
 
 
 class Transcendental:
-    """The transcendental generators of ``field``.  ``divisors`` outlives it: what the bases have to be divided by."""
+    """The transcendental generators of ``field``.  divisors: of the bases, which persist when the field is rebuilt."""
 
     def __init__(self, field: Expressions, divisors: list[int]) -> None:
         self._field = field
@@ -77,7 +77,7 @@ class Transcendental:
     # --- exponentials -----------------------------------------------------------------------------------------------
 
     def exponential(self, argument: Quotient) -> Quotient:
-        """exp of an argument; whole and half multiples of logarithms in it come out as powers."""
+        """exp of an argument; integer and half-integer multiples of logarithms in it become powers."""
         argument, factor = self._without_logarithms(argument)
         if not argument.numerator:
             return factor
@@ -98,38 +98,38 @@ class Transcendental:
 
     def hyperbolic(self, name: str, argument: Quotient) -> Quotient:
         """sinh, cosh, tanh and their reciprocals."""
-        up = self.exponential(argument)
-        down, two = 1 / up, self._tower.number(2)
-        above, below = {
-            "sinh": (up - down, two),
-            "cosh": (up + down, two),
-            "tanh": (up - down, up + down),
-            "coth": (up + down, up - down),
-            "sech": (two, up + down),
-            "csch": (two, up - down),
+        growing = self.exponential(argument)
+        twice_sine, twice_cosine, two = growing - 1 / growing, growing + 1 / growing, self._tower.number(2)
+        numerator, denominator = {
+            "sinh": (twice_sine, two),
+            "cosh": (twice_cosine, two),
+            "tanh": (twice_sine, twice_cosine),
+            "coth": (twice_cosine, twice_sine),
+            "sech": (two, twice_cosine),
+            "csch": (two, twice_sine),
         }[name]
-        return above / below
+        return numerator / denominator
 
     def _in_parts(self, argument: Quotient) -> list[Quotient]:
-        """Constant terms apart from those that move; all terms apart where each is a multiple of a known base."""
+        """The constant and the moving part of an argument; or its terms, where each is a multiple of a known base."""
         terms = self._tower.summands(argument)
-        still = [term for term in terms if self._field.is_constant(term)]
-        if still and len(still) < len(terms):
+        constant = [term for term in terms if self._field.is_constant(term)]
+        if constant and len(constant) < len(terms):
             moving = [term for term in terms if not self._field.is_constant(term)]
             zero = self._tower.number(0)
-            return [sum(still, zero), sum(moving, zero)]
+            return [sum(constant, zero), sum(moving, zero)]
         bases = [base for kind, base, _ in self._bases if kind == "exp"]
         multiples = all(any(self._tower.ratio(term, base) is not None for base in bases) for term in terms)
         return terms if multiples else [argument]
 
     def _without_logarithms(self, argument: Quotient) -> tuple[Quotient, Quotient]:
         """(argument without multiples of logarithms, their exponentials)."""
-        t, factor, rest = self._tower, self._tower.number(1), {}
+        t, factor, terms = self._tower, self._tower.number(1), {}
         denominator = argument.denominator
         if not denominator.is_constant():
             return argument, factor
         for monomial, coefficient in argument.numerator.to_dict().items():
-            twice = 2 * Fraction(int(coefficient.p), int(coefficient.q))
+            twice = 2 * as_fraction(coefficient)
             index = _single(monomial)
             is_log = index is not None and t.generators[index].kind == "log"
             if is_log and index is not None and twice.denominator == 1 and abs(twice) <= _MAX_MULTIPLE:
@@ -138,13 +138,13 @@ class Transcendental:
                 power = int(twice) // 2 if twice % 2 == 0 else int(twice)
                 factor = factor * base**power
             else:
-                rest[monomial] = coefficient
-        return t.polynomial(t.context.from_dict(rest)), factor
+                terms[monomial] = coefficient
+        return t.polynomial(t.context.from_dict(terms)), factor
 
     def _multiple(self, kind: str, argument: Quotient, make: Callable[[Quotient], int]) -> tuple[int, int]:
         """(generator, n): the argument is n times the generator's base.
 
-        make: adds the generator of a new base, which is the argument over as much as has turned out to be needed.
+        make: adds the generator of a new base, the argument over the divisor known so far.
         """
         for position, (known_kind, base, index) in enumerate(self._bases):
             if kind == known_kind:
@@ -164,17 +164,17 @@ class Transcendental:
         base = argument / divisor
         position = len(self._bases)
         self._bases.append((kind, base, -1))
-        self._bases[position] = (kind, base, make(base))
-        return self._bases[position][2], divisor
+        self._bases[position] = (kind, base, index := make(base))
+        return index, divisor
 
     # --- the circle -------------------------------------------------------------------------------------------------
 
     def circle(self, argument: Quotient) -> Circle:
-        """(sin, cos) of an argument: sums by the addition theorem, multiples by powers of cos + i sin."""
+        """(sin, cos) of an argument: sums and multiples by the addition theorem."""
         total = self._tower.number(0), self._tower.number(1)
         if argument.numerator:
             for part in self._tower.summands(argument):
-                total = turned(total, self._circle_of_term(part))
+                total = circle_of_sum(total, self._circle_of_term(part))
         return total
 
     def _circle_of_term(self, value: Quotient) -> Circle:
@@ -189,19 +189,19 @@ class Transcendental:
         def make(base: Quotient) -> int:
             t, angle = self._tower, self._field.expression(base)
             sine, cosine = sympy.sin(angle, evaluate=False), sympy.cos(angle, evaluate=False)
-            index, partner = self._new_pair("sin", sine, "cos", cosine, (base,))
-            t.signs.circles[index] = partner
+            sine_index, cosine_index = self._new_pair("sin", sine, "cos", cosine, (base,))
+            t.signs.circles[sine_index] = cosine_index
             if self._is_between(base, -_QUARTER, _QUARTER):  # the cosine is > 0
-                for positive in (t.gens[partner], 1 - t.gens[index], 1 + t.gens[index]):
+                for positive in (t.gens[cosine_index], 1 - t.gens[sine_index], 1 + t.gens[sine_index]):
                     t.signs.declare(positive, PLUS)
-            return index
+            return sine_index
 
         index, multiple = self._multiple("circle", value, make)
         return self._times((self._generator(index), self._generator(self._tower.signs.circles[index])), multiple)
 
     def circle_of_turn(self, turn: Fraction) -> Circle:
         """(sin, cos) of a multiple of π, in square roots; the denominator of ``turn`` divides 12."""
-        angle = sympy.pi * sympy.Rational(turn.numerator, turn.denominator)
+        angle = sympy.pi * sympy.Rational(turn)
         return self._field.enter(sympy.sin(angle)), self._field.enter(sympy.cos(angle))
 
     def _inverse_multiple(self, value: Quotient) -> tuple[Circle, int] | None:
@@ -228,15 +228,15 @@ class Transcendental:
         u = g.arguments[0]
         if g.kind in ("atan", "atan2"):
             return u, (*g.arguments, one)[1]
-        other = self._tower.root(one - u * u)
-        return (u, other) if g.kind == "asin" else (other, u)
+        root = self._tower.root(one - u * u)
+        return (u, root) if g.kind == "asin" else (root, u)
 
     def _times(self, circle: Circle, multiple: int) -> Circle:
         """(sin, cos) of a multiple."""
         sine, cosine = circle if multiple > 0 else (-circle[0], circle[1])
         result = self._tower.number(0), self._tower.number(1)
         for _ in range(abs(multiple)):
-            result = turned(result, (sine, cosine))
+            result = circle_of_sum(result, (sine, cosine))
         return result
 
     # --- Jacobi's functions -----------------------------------------------------------------------------------------
@@ -252,13 +252,13 @@ class Transcendental:
         if name != "dn":
             return sine if name == "sn" else cosine
         square = 1 - parameter * sine * sine
-        self._tower.declare(square)  # where 0 ≤ m ≤ 1, which is a condition of each proof
+        self._tower.declare(square)  # for 0 ≤ m ≤ 1, which is a condition of each proof
         return self._tower.root(square)
 
     def weierstrass(self, name: str, arguments: tuple[Quotient, Quotient, Quotient]) -> Quotient:
         """℘ is a free generator, (L ℘')² = L² (4℘³ − g2 ℘ − g3) with a common denominator L of the invariants.
 
-        1/℘, which stands in conditions alone, is one of its own: it may be 0.
+        1/℘, which occurs in conditions only, is another free generator: it may be 0.
         """
         t, kind = self._tower, name.removesuffix("prime")
         lowest = self._lowest_root(*arguments[1:]) if kind == "wp3" and not arguments[0].numerator else None
@@ -295,28 +295,28 @@ class Transcendental:
         square = (scale * scale * (4 * p**3 - g2 * p - g3)).numerator
         return index, self._new_root(self._field.expression(scale) * rate, square, f"{kind}prime")
 
-    # --- logarithms and the rest ------------------------------------------------------------------------------------
+    # --- logarithms and other functions -----------------------------------------------------------------------------
 
     def logarithm(self, inside: Quotient) -> Quotient:
-        """ln: exponentials come out as their arguments, positive factors and primes as logarithms of their own."""
+        """ln as a sum: arguments of exponentials, logarithms of positive factors and primes, and one of the others."""
         t = self._tower
-        total, sign, number, left = t.number(0), 1, Fraction(1), [t.one, t.one]
+        total, sign, number, remaining = t.number(0), 1, Fraction(1), [t.one, t.one]
         for side, part in enumerate((inside.numerator, inside.denominator)):
             constant, factors = part.factor()
             sign *= 1 if constant > 0 else -1
-            number *= abs(Fraction(int(constant.p), int(constant.q))) ** (1 - 2 * side)
+            number *= abs(as_fraction(constant)) ** (1 - 2 * side)
             for factor, power in factors:
                 known = t.signs.of(factor)
-                if known.value:  # where it is 0, the whole has no logarithm
+                if known.value:  # where it is 0, the logarithm is undefined
                     sign *= known.value ** int(power)
                     weight = int(power) * (1 - 2 * side)
                     total = total + weight * self._logarithm_of_factor(factor * known.value)
                 else:
-                    left[side] = t.times(left[side], t.raised(factor, int(power)))
+                    remaining[side] = t.times(remaining[side], t.raised(factor, int(power)))
         total = total + self._logarithm_of_number(number)
-        if left == [t.one, t.one] and sign > 0:
+        if remaining == [t.one, t.one] and sign > 0:
             return total
-        return total + self.function("log", (t.quotient(left[0] * sign, left[1]),))
+        return total + self.function("log", (t.quotient(remaining[0] * sign, remaining[1]),))
 
     def _logarithm_of_number(self, value: Fraction) -> Quotient:
         """ln of a positive fraction, over its primes where they are small."""
@@ -341,7 +341,7 @@ class Transcendental:
         return self.function("log", (t.polynomial(factor),))
 
     def function(self, name: str, arguments: tuple[Quotient, ...]) -> Quotient:
-        """A free generator for a function of these arguments: the same arguments, the same generator."""
+        """The free generator of a function of these arguments."""
         key = _key(name, *arguments)
         if key not in self._functions:
             known = self._through_known(name, arguments[0]) if name in ("asin", "acos", "atan") else None
@@ -373,7 +373,7 @@ class Transcendental:
         return Sign(1, _POSITIVE[name] or t.sign(first).strict) if name in _POSITIVE else UNKNOWN
 
     def _through_known(self, name: str, u: Quotient) -> Quotient | None:
-        """asin, acos or atan of ``u`` through the angle in it, or through a function that the field has already.
+        """asin, acos or atan of ``u`` by the angle in ``u``, or by a function that the field has already.
 
         acos(cos w) = w, asin(−u) = −asin u, asin u + acos u = π/2, atan u + atan 1/u = ± π/2.
         """
@@ -405,7 +405,7 @@ class Transcendental:
         return None
 
     def _is_between(self, angle: Quotient, low: Fraction, high: Fraction) -> bool:
-        """low ≤ angle ≤ high all over the domain, shown."""
+        """Whether low ≤ angle ≤ high is proven on the whole domain."""
         return self._tower.sign(angle - low).value > 0 and self._tower.sign(high - angle).value > 0
 
     # --- generators -------------------------------------------------------------------------------------------------
@@ -437,7 +437,7 @@ class Transcendental:
         return index, partner
 
     def _declare_order(self, index: int) -> None:
-        """Declares the order of the values of a monotone function at ordered constants."""
+        """Declares the order of the values of a monotone function at constants."""
         t, g = self._tower, self._tower.generators[index]
         for other, before in enumerate(t.generators[:index]):
             if before.kind == g.kind and g.constant and before.constant:

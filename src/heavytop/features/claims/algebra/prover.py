@@ -1,4 +1,4 @@
-"""Statements of one claim, proven or not: their fields are shared, and every condition of a proof is listed."""
+"""Proofs of the statements of one claim, in shared fields, with every condition of each proof."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ from heavytop.features.claims.algebra.statement import Domain, Flow, Point, Sett
 from heavytop.features.claims.algebra.structure import sign_of
 from heavytop.precision import shown
 
-# The proof of one statement: an identity of the algebra, and every condition under which it proves anything.
+# The proof of one statement: an identity of the algebra, and the conditions under which it proves the statement.
 #
 # Continuous values that satisfy an equation off a set without interior satisfy it everywhere: so a zero of a
-# denominator is removable where the values are continuous across it, and two halves of the time axis join.
+# denominator is removable where the values are continuous across it, and proofs on two halves of the time axis join.
 
 
 _EVERYWHERE = "proven on the whole domain"
@@ -49,9 +49,9 @@ _SOME_STATE = {
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """A condition of a proof: whether it is discharged, and how, or what stands against it.
+    """A condition of a proof: whether it is discharged, and how, or the obstacle.
 
-    assumption: what would discharge it, where that is about the parameters alone.
+    assumption: an assumption on the parameters that would discharge it; "" for none.
     """
 
     text: str
@@ -61,7 +61,7 @@ class Condition:
 
 
 def _answered_once(question: Callable[[Region, fmpq_mpoly], bool]) -> Callable[[Region, fmpq_mpoly], bool]:
-    """The question about a polynomial, answered once for each; while it is looked into the answer is no."""
+    """A question about a polynomial with its answers stored; within itself the answer to the same question is no."""
 
     @wraps(question)
     def answer(region: Region, p: fmpq_mpoly) -> bool:
@@ -75,7 +75,7 @@ def _answered_once(question: Callable[[Region, fmpq_mpoly], bool]) -> Callable[[
 
 
 class Region:
-    """A field over one part of the domain, with what is known to vanish nowhere or on no open set there."""
+    """A field over one part of the domain: where its polynomials vanish, and which needs hold."""
 
     def __init__(self, field: Field, setting: Setting, statement: Statement, sample_points: Sequence[Point]) -> None:
         self.field = field
@@ -87,7 +87,7 @@ class Region:
         self._divisors: dict[tuple[bool, str], bool] = {}
         self._needs = statement.formulas.needs
         self.regularity = Regularity(field, self.is_nowhere_zero)
-        # what is not 0 where the flow keeps it so may part the domain
+        # polynomials that the flow keeps from 0 may divide the domain
         self.everywhere = Regularity(field) if statement.flow is not None else self.regularity
         self._arcs = Arcs(field, self.everywhere, self.sample_points, self.is_connected)
 
@@ -98,7 +98,7 @@ class Region:
 
     @where_provable(False)
     def vanishes(self, expression: sympy.Expr) -> bool:
-        """0 by the algebra, and by what inverse functions add up to."""
+        """0 by the algebra, and by relations between inverse functions."""
         p = self.field.enter(expression).numerator
         return not (p and self._arcs.without(p))
 
@@ -107,7 +107,7 @@ class Region:
         return self.field.is_forced(expression, radical=radical, simpler=self._arcs.without)
 
     def is_nowhere_zero(self, p: fmpq_mpoly) -> bool:
-        """0 nowhere on the region (of a first integral: nowhere on the part that the flow keeps)."""
+        """0 nowhere on the region; for a first integral, nowhere on the part that the flow preserves."""
         return self._is_never_zero(p) or self.is_kept(p)
 
     @_answered_once
@@ -128,11 +128,11 @@ class Region:
         regularity = Regularity(field)
         if regularity.obstacle(cofactor) or regularity.obstacle(value):
             return False
-        own = Region(field, self._setting, self._statement, self.sample_points)
-        return all(own.is_zero_nowhere_dense(divisor) for divisor in divisors)
+        region = Region(field, self._setting, self._statement, self.sample_points)
+        return all(map(region.is_zero_nowhere_dense, divisors))
 
     def leaves(self, rate: sympy.Expr) -> str:
-        """Why a relation with this rate may not stay 0; "" where it does.
+        """The obstacle to a proof that a relation with this rate stays 0; "" for none.
 
         It does where its rate is a combination of the relations with factors that are continuous where these are 0.
         """
@@ -140,23 +140,20 @@ class Region:
             field = Field(self.field.assumptions, [rate, *self.field.assumptions.relations])
         except Unprovable as error:
             return error.cause
-        own = Region(field, self._setting, self._statement, self.sample_points)
-        if not own.vanishes(rate) and not own.is_forced(rate, radical=False):
+        region = Region(field, self._setting, self._statement, self.sample_points)
+        if not region.vanishes(rate) and not region.is_forced(rate, radical=False):
             return "its rate is not shown to be 0 there"
-        divisor = next(own.divisors(forced=True), "")
+        divisor = next(region.divisors(forced=True), "")
         return divisor and f"its rate is divided by {divisor}, which may be 0 there"
 
     def _is_excluded(self, p: fmpq_mpoly) -> bool:
-        """The claim is made where p is not 0, as it is written, and p keeps its sign."""
-        one = self.field.tower.one
+        """A need of the claim as written has the factor p, so p is not 0, and p keeps its sign."""
         for need in self._needs:
             if need.kind is not ConditionKind.NONNEGATIVE:
-                try:
+                with suppress(Unprovable):
                     value = self.field.enter(need.expression)
-                except Unprovable:
-                    continue
-                if value.denominator == one and not divmod(value.numerator, p)[1]:
-                    return self.is_kept(p)
+                    if value.denominator == self.field.tower.one and not divmod(value.numerator, p)[1]:
+                        return self.is_kept(p)
         return False
 
     @_answered_once
@@ -177,7 +174,7 @@ class Region:
         return any(self._is_nonzero_at(p, point) for point in self.sample_points)
 
     def is_connected(self, indices: set[int], fixed: Collection[sympy.Symbol] = ()) -> bool:
-        """Linear inequalities bound a convex domain of the symbols in these generators, and of those bound to them.
+        """Linear inequalities bound a convex domain of the symbols in these generators, and of those related to them.
 
         fixed: symbols that do not move.
         """
@@ -185,13 +182,13 @@ class Region:
         bounds = [bound for bound in a.bounds() if bound.free_symbols]
         zeros = [relation for relation in a.relations if relation not in self._always]
         near = set().union(*(self.field.meaning(index).free_symbols for index in indices)).difference(fixed)
-        bound_together = [e.free_symbols.difference(fixed) for e in (*bounds, *zeros, *self._always)]
-        while more := set().union(*(symbols for symbols in bound_together if symbols & near)) - near:
+        related = [e.free_symbols.difference(fixed) for e in (*bounds, *zeros, *self._always)]
+        while more := set().union(*(symbols for symbols in related if symbols & near)) - near:
             near |= more
-        cut = set(a.nonzero).union(*(zero.free_symbols for zero in zeros))
-        round_ = set().union(*(zero.free_symbols for zero in self._always))
-        return not near & cut and all(
-            not bound.free_symbols & round_
+        restricted = set(a.nonzero).union(*(zero.free_symbols for zero in zeros))
+        on_sphere = set().union(*(zero.free_symbols for zero in self._always))
+        return not near & restricted and all(
+            not bound.free_symbols & on_sphere
             and is_small_polynomial(bound)
             and sympy.Poly(bound, *bound.free_symbols.difference(fixed)).total_degree() <= 1
             for bound in bounds
@@ -200,7 +197,7 @@ class Region:
 
     @where_provable(False)
     def _is_nonzero_at_some_state(self, p: fmpq_mpoly, flow: Flow) -> bool:
-        """A polynomial that is not 0 all over |γ| = 1 is 0 on no open part of it."""
+        """Not 0 at one state with |γ| = 1: then a polynomial is 0 on no open part of the sphere."""
         expression = self._expression(p).xreplace(dict(flow.names))
         others = (Fraction(2 * n + 7, 3 * n + 5) for n in range(len(expression.free_symbols)))
         values = {s: _SOME_STATE.get(str(s)) or next(others) for s in expression.free_symbols}
@@ -210,9 +207,8 @@ class Region:
         return self.field.expression(self.field.tower.polynomial(p))
 
     def _is_nonzero_at(self, p: fmpq_mpoly, point: Point) -> bool:
-        meanings = {index: self.field.meaning(index) for index in used(p)}
         try:
-            balls = {index: evaluate(meaning, point, NUMBER_BITS) for index, meaning in meanings.items()}
+            balls = {index: evaluate(self.field.meaning(index), point, NUMBER_BITS) for index in used(p)}
         except (KeyError, Unprovable):
             return False
         value = value_of(p, balls)
@@ -221,18 +217,18 @@ class Region:
     # --- conditions -------------------------------------------------------------------------------------------------
 
     def discharge(self, need: Need) -> str:
-        """How it is discharged all over the region; "" where it is not."""
+        """The reason why the need is met on the whole region; "" where it is not shown to be."""
         if self.fails_everywhere(need):
             return ""
         on_relations = self._on_relations(need)
-        how = self._discharge(need) or (self._discharge(on_relations) if on_relations != need else "")
-        return "" if how == KEPT and not self.is_met_for_each(need) else how
+        reason = self._discharge(need) or (self._discharge(on_relations) if on_relations != need else "")
+        return "" if reason == KEPT and not self.is_met_for_each(need) else reason
 
     def _on_relations(self, need: Need) -> Need:
         return replace(need, expression=on_conditions(need.expression, [*self._setting.relations, *self._always]))
 
     def is_met_for_each(self, need: Need) -> bool:
-        """Where it asks that its expression is not 0: it is so somewhere, for any values of the parameters."""
+        """Whether an expression that must not be 0 is not 0 somewhere, for any values of the parameters."""
         if need.kind is not ConditionKind.NONZERO:
             return True
         try:
@@ -242,7 +238,7 @@ class Region:
         return bool(value.numerator) and all(map(self.is_for_no_parameters, self._factors(value.numerator)))
 
     def fails_everywhere(self, need: Need) -> str:
-        """Its expression at every state of a body, where that does not meet it; else ""."""
+        """The constant value of its expression at every state of a body, where that does not meet it; else ""."""
         value = on_conditions(need.expression, self._always)
         if value.free_symbols or replace(need, expression=value).is_met({}) is not False:
             return ""
@@ -258,13 +254,13 @@ class Region:
             return _EVERYWHERE
         value = self.field.enter(need.expression)
         factors = self._factors(value.numerator) if need.kind is ConditionKind.NONZERO and value.numerator else []
-        apart = bool(factors) and all(map(self._is_never_zero, factors))
-        if apart or need.kind.is_met_by(self.field.tower.sign(value)):
+        is_nonzero = bool(factors) and all(map(self._is_never_zero, factors))
+        if is_nonzero or need.kind.is_met_by(self.field.tower.sign(value)):
             return _EVERYWHERE
         return KEPT if self.keeps_sign(value, need.kind) else ""
 
     def keeps_sign(self, value: Quotient, kind: ConditionKind) -> bool:
-        """Along the flow: its numerator does, and its denominator, unless only that it is not 0 is asked."""
+        """Whether its numerator keeps its sign along the flow, and its denominator too unless the kind is NONZERO."""
         if self._flow is None or not value.numerator or not self.is_kept(value.numerator):
             return False
         return kind is ConditionKind.NONZERO or all(map(self.is_nowhere_zero, self._factors(value.denominator)))
@@ -274,19 +270,19 @@ class Region:
 
     @where_provable(False)
     def is_removable(self, need: Need) -> bool:
-        """It fails, for any values of the parameters, on a set without interior at most."""
-        if self._setting.relations:  # on them it may fail all over
+        """Whether the need fails on a set without interior at most, for any values of the parameters."""
+        if self._setting.relations:  # on them it may fail everywhere
             return False
         value = self.field.enter(need.expression)
-        weak = need.kind is ConditionKind.NONZERO or self.field.tower.sign(value).value > 0
-        return weak and bool(value.numerator) and all(map(self._is_thin_for_each, self._factors(value.numerator)))
+        may_vanish = need.kind is ConditionKind.NONZERO or self.field.tower.sign(value).value > 0
+        return may_vanish and bool(value.numerator) and all(map(self._is_thin_for_each, self._factors(value.numerator)))
 
     def _factors(self, p: fmpq_mpoly) -> list[fmpq_mpoly]:
         return [factor for factor, _ in self.field.tower.signs.factors(p)[1]]
 
     @_answered_once
     def _is_thin_for_each(self, p: fmpq_mpoly) -> bool:
-        """0 on a set without interior at most, whatever the parameters are."""
+        """0 on a set without interior at most, for any values of the parameters."""
         square = self._square(p)
         if square is not None:
             return all(map(self._is_thin_for_each, self._factors(square)))
@@ -296,21 +292,21 @@ class Region:
             return False
         parameters = self._setting.parameters
         return self.is_zero_nowhere_dense(p) or (
-            # analytic in what moves, over a domain in one piece
+            # analytic in the symbols that move, on a connected domain
             bool(self.field.symbols(p) & parameters)
             and self.is_connected(used(p), fixed=parameters)
             and not self.everywhere.obstacle_of_generators(used(p), analytic=True)
         )
 
     def _square(self, p: fmpq_mpoly) -> fmpq_mpoly | None:
-        """The radicand of a polynomial that is a root by itself; None of another."""
-        tower, (index, *others) = self.field.tower, sorted(used(p))
-        alone = not others and p == tower.gens[index] and tower.generators[index].kind == "root"
-        return tower.squares[index] if alone else None
+        """The radicand of a polynomial that is a root; None for any other."""
+        tower, index = self.field.tower, min(used(p))
+        is_root = p == tower.gens[index] and tower.generators[index].kind == "root"
+        return tower.squares[index] if is_root else None
 
     @where_provable(False)
     def is_for_no_parameters(self, p: fmpq_mpoly) -> bool:
-        """True only where p is 0 all over the region for no values of the parameters."""
+        """True only where p is 0 on the whole region for no values of the parameters."""
         flow, domain, e = self._statement.flow, self._statement.domain, self._expression(p)
         if flow is not None:
             state = {symbol: sympy.Rational(_SOME_STATE[str(symbol)]) for symbol in flow.state - flow.names.keys()}
@@ -323,17 +319,15 @@ class Region:
         return for_no_parameters(e, self.field.assumptions, points)
 
     def assumption_for(self, need: Need) -> str:
-        """An assumption on parameters that would discharge it, or leave zeros that are removable; "" for nothing."""
+        """An assumption on parameters that would discharge it, or leave removable zeros; "" for none."""
         parameters = self._setting.parameters
-        open_part = need.expression if need.expression.free_symbols <= parameters else None
-        if open_part is None and need.kind is ConditionKind.NONZERO:
+        e = need.expression if need.expression.free_symbols <= parameters else sympy.Integer(1)
+        if e is not need.expression and need.kind is ConditionKind.NONZERO:
             with suppress(Unprovable):
-                parts = [*map(self._expression, self._factors(self.field.enter(need.expression).numerator))]
-                alone = [part for part in parts if part.free_symbols <= parameters]
-                open_part = sympy.Mul(*(part for part in alone if not is_never_zero(part, self.field.assumptions)))
-        if open_part is None or not open_part.free_symbols:
-            return ""
-        return written(f"{open_part} {'!=' if need.kind is ConditionKind.NONZERO else '>'} 0")
+                factors = map(self._expression, self._factors(self.field.enter(need.expression).numerator))
+                of_parameters = [factor for factor in factors if factor.free_symbols <= parameters]
+                e = sympy.Mul(*(f for f in of_parameters if not is_never_zero(f, self.field.assumptions)))
+        return written(f"{e} {'!=' if need.kind is ConditionKind.NONZERO else '>'} 0") if e.free_symbols else ""
 
     def obstacle(self, values: Sequence[sympy.Expr]) -> str:
         """The obstacle to the values being real and continuous all over the region."""
@@ -347,7 +341,7 @@ class Region:
         return ""
 
     def divisors(self, *, forced: bool) -> Iterator[str]:
-        """Divisors of the algebra that might be 0 on too much of the region; forced: on any of it."""
+        """Divisors of the algebra that may be 0 on an open part of the region; forced: at any point of it."""
         for text, p in list(self.field.tower.divisors.items()):
             if (forced, text) not in self._divisors:
                 self._divisors[forced, text] = (
@@ -372,7 +366,7 @@ _AT_THE_END = "proven inside the domain, removable in gamma at its end"
 
 
 class Prover:
-    """The statements of a claim with the fields in which they are proven."""
+    """The fields and regions of a claim's statements, and their proofs."""
 
     def __init__(self, statements: Sequence[Statement], setting: Setting) -> None:
         self._statements = statements
@@ -386,16 +380,13 @@ class Prover:
     # --- fields -----------------------------------------------------------------------------------------------------
 
     def field(self, statement: Statement, sign: int, *, strict: bool = False) -> Field | None:
-        """The field for this statement with this sign of the variable; None where the algebra cannot carry it."""
+        """The field of a statement with this sign of the variable; None where it is beyond the algebra."""
         key: tuple[object, ...] = (sign, strict, statement.branch, statement.domain.label + statement.domain.note)
         if key not in self._fields:
-            alike = [
-                other
-                for other in self._statements
-                if (other.branch, other.domain) == (statement.branch, statement.domain)
-            ]
-            parts = [part for _, part in self._setting.parts.get(statement.branch, ())]
-            self._fields[key] = self._make(alike, sign, strict, parts)
+            branch, domain = statement.branch, statement.domain
+            group = [s for s in self._statements if (s.branch, s.domain) == (branch, domain)]
+            parts = [part for _, part in self._setting.parts.get(branch, ())]
+            self._fields[key] = self._make(group, sign, strict, parts)
         if self._fields[key] is None:
             key = (*key, statement.residual)
             if key not in self._fields:
@@ -420,14 +411,12 @@ class Prover:
             expressions |= dict.fromkeys(need.expression for need in _sorted(f.needs | f.angle_needs))
             kept |= {e for e in (*f.values, *(need.expression for need in f.needs)) if _is_kept(e, statement)}
         for chosen in (expressions, [e for e in expressions if e not in kept]):
-            try:
+            with suppress(Unprovable):
                 return Field(assumptions, chosen)
-            except Unprovable:
-                continue
         return None
 
     def _kept_facts(self, statement: Statement) -> list[Need]:
-        """Facts of a first integral: what has to be positive or 0 for it to be real, and stays so under the flow."""
+        """Needs that a first integral is positive or >= 0 and that the flow preserves."""
         if statement.flow is None:
             return []
         needs = [need for need in _sorted(statement.formulas.needs) if need.kind is not ConditionKind.NONZERO]
@@ -467,7 +456,7 @@ class Prover:
         return proven, (*self._conditions[key], *divisors, sample)
 
     def _identity(self, statement: Statement) -> tuple[bool, list[Condition]]:
-        """By one field, or for ``all`` by one for either sign of the variable: together they are dense in it."""
+        """A proof in one field, or for ``all`` in one for each sign of the variable: together these are dense."""
         domain = statement.domain
         strict = bool(domain.sign)
         divisors = self._zero_in(self._region(statement, domain.sign, strict=strict), statement)
@@ -480,14 +469,14 @@ class Prover:
         return True, [Condition(_DIVISORS, False, f"it divides by {text}") for text in divisors]
 
     def _zero_in(self, region: Region | None, statement: Statement) -> list[str] | None:
-        """The divisors that stand against the proof; None without a proof."""
+        """The divisors that are obstacles to the proof; None without a proof."""
         if region is None:
             return None
         flow = statement.flow
         if region.vanishes(statement.residual) or (
             flow is not None and any(region.field.vanishes_on(statement.residual, zero) for zero in flow.always)
         ):
-            # where the relations are 0 a divisor may be so too, however thin the set of its zeros is elsewhere
+            # on the relations a divisor may be 0 everywhere, though it is not elsewhere
             return list(region.divisors(forced=flow is not None and bool(self._setting.relations)))
         radical = flow is None or not flow.is_relation
         if region.is_forced(statement.residual, radical=radical):
@@ -497,12 +486,12 @@ class Prover:
     def _sample(self, statement: Statement) -> Condition:
         sample_points = self.sample_points(statement)
         if not sample_points:
-            return Condition(_SAMPLE, False, self._why_no_place(statement))
+            return Condition(_SAMPLE, False, self._why_no_sample(statement))
         if any(self.is_defined(statement, point) for point in sample_points):
             return Condition(_SAMPLE, True, "checked in balls")
         return Condition(_SAMPLE, False, "at no sample in the domain is every formula defined and real")
 
-    def _why_no_place(self, statement: Statement) -> str:
+    def _why_no_sample(self, statement: Statement) -> str:
         setting = self._setting
         if not setting.samples:
             return "no exact state is known: give samples at which the start is rational and moves, or states"
@@ -515,12 +504,13 @@ class Prover:
         return _missed(statement, setting)
 
     def is_defined(self, statement: Statement, point: Point) -> bool:
-        """Whether every formula and the residual is certainly defined and real at a place."""
+        """Whether every formula and the residual is certainly defined and real at a point."""
         formulas = statement.formulas
-        needed = formulas.sampled or formulas.needs | formulas.angle_needs, frozenset(point.items())
-        if needed not in self._met:
-            self._met[needed] = all(need.is_met(point) for need in needed[0])
-        if not self._met[needed]:
+        needs = formulas.sampled or formulas.needs | formulas.angle_needs
+        key = needs, frozenset(point.items())
+        if key not in self._met:
+            self._met[key] = all(need.is_met(point) for need in needs)
+        if not self._met[key]:
             return False
         # |u| has no derivative where u is 0
         if any(
@@ -541,27 +531,23 @@ class Prover:
         inner = self._region(statement, domain.sign, strict=True) if ends else everywhere
         if everywhere is None or inner is None:
             return [Condition(_ALGEBRA, False, "the formulas are too large, or hold what it does not know")]
-        # a function of first integrals alone is as constant as they are, continuous or not
+        # a function of first integrals alone is constant, continuous or not
         moving = [value for value in f.values if not _is_kept(value, statement)]
-        against = everywhere.obstacle(moving), inner.obstacle(f.attitude)
-        continuous = bool(f.values) and not any(against) and not everywhere.obstacle(f.values)
-        needed = {
-            need: everywhere.discharge(need)
-            or (KEPT if _is_kept(need.expression, statement) and everywhere.is_met_for_each(need) else "")
-            for need in _sorted(f.needs | f.angle_needs)
-        }
-        for need, how in needed.items():
-            if not how and need not in f.needs and inner.discharge(need) and continuous:
-                needed[need] = _AT_THE_END
-            elif not how and continuous and inner.is_removable(need):
-                needed[need] = _REMOVABLE
+        obstacles = everywhere.obstacle(moving), inner.obstacle(f.attitude)
+        continuous = bool(f.values) and not any(obstacles) and not everywhere.obstacle(f.values)
         conditions = []
-        for need, how in needed.items():
-            missing = "" if how else everywhere.assumption_for(need)
+        for need in _sorted(f.needs | f.angle_needs):
+            reason = everywhere.discharge(need)
+            if not reason and _is_kept(need.expression, statement) and everywhere.is_met_for_each(need):
+                reason = KEPT
+            if not reason and continuous:
+                at_the_end = need not in f.needs and inner.discharge(need)
+                reason = _AT_THE_END if at_the_end else _REMOVABLE if inner.is_removable(need) else ""
+            missing = "" if reason else everywhere.assumption_for(need)
             unmet = f"{missing} is not assumed" if missing.endswith("!= 0") else "not shown"
-            reason = how or everywhere.fails_everywhere(need) or unmet
-            conditions.append(Condition(need.text, bool(how), reason, missing))
-        for text, values, obstacle in ((_CONTINUOUS, f.values, against[0]), (_ATTITUDE, f.attitude, against[1])):
+            text = reason or everywhere.fails_everywhere(need) or unmet
+            conditions.append(Condition(need.text, bool(reason), text, missing))
+        for text, values, obstacle in ((_CONTINUOUS, f.values, obstacles[0]), (_ATTITUDE, f.attitude, obstacles[1])):
             if values:
                 conditions.append(Condition(text, not obstacle, obstacle or "by the rules of composition"))
         if f.pole:
@@ -571,22 +557,20 @@ class Prover:
     def _kept(self, statement: Statement, region: Region) -> Iterable[Condition]:
         """The side conditions are invariant: their rates are combinations of them."""
         for text, rate in statement.flow.kept if statement.flow is not None else ():
-            against = region.leaves(rate)
-            reason = against or "its rate is a combination of the conditions"
-            yield Condition(f"{text} = 0 is kept by the flow", not against, reason)
+            obstacle = region.leaves(rate)
+            reason = obstacle or "its rate is a combination of the conditions"
+            yield Condition(f"{text} = 0 is kept by the flow", not obstacle, reason)
 
 
 def _missed(statement: Statement, setting: Setting) -> str:
-    """Which relation the first sample of a body misses, or bounds of the variable all points; for whom wrote them."""
+    """The relation that the first sample misses, or the bounds of the variable that all points miss."""
     on_sphere = ", at a state with |gamma| = 1" if statement.flow is not None else ""
     for sample in setting.samples:
         point = {setting.variable: statement.domain.points[0], **sample}
         for zero in setting.zeros:
             if is_exactly_zero(zero, point) is False:
-                used = ", ".join(
-                    f"{name} = {shown(value)}" for name, value in sample.items() if name in zero.free_symbols
-                )
-                where = f"where {used}, {written(str(zero))} is not 0"
+                parts = [f"{name} = {shown(value)}" for name, value in sample.items() if name in zero.free_symbols]
+                where = f"where {', '.join(parts)}, {written(str(zero))} is not 0"
                 return f"no sample lies on the relations{on_sphere}: {where}"
         if not setting.zeros and statement.domain.facts:
             points = ", ".join(map(str, statement.domain.points))
@@ -599,7 +583,7 @@ def _is_kept(expression: sympy.Expr, statement: Statement) -> bool:
 
 
 def shortest(formula: sympy.Expr, setting: Setting, domain: Domain) -> sympy.Expr:
-    """The formula as the algebra writes it, if that is shorter and proven to be equal, but for removable gaps."""
+    """The formula as the algebra writes it, if that is shorter and proven to be equal up to removable gaps."""
     statement = Statement("", 0, "", domain, formula, "")
     try:
         field = Field(setting.assumptions(domain.sign, strict=domain.label == "t>0"), [formula])

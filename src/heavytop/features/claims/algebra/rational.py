@@ -1,8 +1,8 @@
-"""Rational functions over FLINT modulo square roots: where an identity is proven, exactly.
+"""Rational functions over FLINT modulo square roots, in which identities are proven.
 
 A :class:`Tower` holds generators x0, x1, ...; some are free (parameters, time, an exponential), some are roots with
-a relation R² = q, q a polynomial in the generators before R.  Whatever reduces to 0 modulo the relations is 0
-wherever none of the tower's ``divisors`` is 0.  The converse needs the roots to be independent and is not claimed.
+a relation R² = q, q a polynomial in earlier generators.  An expression that reduces to 0 modulo the relations is 0
+wherever none of the tower's ``divisors`` is 0.  The converse needs independent roots and is not claimed.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 from flint import Ordering, fmpq, fmpq_mpoly, fmpz, fmpz_mpoly_ctx, fmpz_mpoly_vec
 
 from heavytop.exact.flint.balls import working_precision
-from heavytop.features.claims.algebra.ring import Generator, PolynomialRing, Quotient, Unprovable, used
+from heavytop.features.claims.algebra.ring import Generator, PolynomialRing, Quotient, Unprovable, as_fraction, used
 from heavytop.features.claims.algebra.signs import NUMBER_BITS, Sign, Signs
 
 # Nested square roots that are sums of simpler ones: √(3 + 2√2) = 1 + √2, √(a + √(a² − b²)) = (√(a + b) + √(a − b))/√2.
@@ -27,15 +27,15 @@ from heavytop.features.claims.algebra.signs import NUMBER_BITS, Sign, Signs
 # where A ≥ 0, so that both radicands are ≥ 0 with p; for s < 0 also D ≥ 0, so that the sum is.
 
 
-# roots within roots that are taken apart
+# depth of nested roots that are denested
 _DEPTH = 3
 _MAX_TERMS = 40
 
 
 def denested(tower: Tower, p: fmpq_mpoly, depth: int = _DEPTH) -> Quotient | None:
-    """√p through roots that are nested less, for a polynomial ``p`` in roots; None without such a sum.
+    """√p as a sum of less nested roots, for a polynomial ``p`` in roots; None without such a sum.
 
-    It is √p wherever that is real.
+    It equals √p wherever that is real.
     """
     roots = [index for index in sorted(used(p), reverse=True) if tower.generators[index].kind == "root"]
     if not depth or len(p) > _MAX_TERMS:
@@ -73,13 +73,13 @@ def _as_sum(tower: Tower, p: fmpq_mpoly, index: int, depth: int) -> Quotient | N
 
 
 def _plain_root(tower: Tower, p: fmpq_mpoly, *, any_sign: bool = False) -> Quotient | None:
-    """√p where that nests no root, from factors of known sign; with ``any_sign`` some D with D² = p."""
+    """√p without nested roots, from factors of known sign; with ``any_sign`` some D with D² = p."""
     if not p:
         return tower.number(0)
     constant, factors = tower.signs.factors(p)
     result, signed = tower.one, []
     for factor, power in factors:
-        # an even power of a square comes out of the root, as does any where the sign of the root may be either
+        # an even power comes out of the root where it is a fourth power, or where the root may have either sign
         needs_no_sign = power % 4 == 0 or (any_sign and power % 2 == 0)
         sign = 1 if needs_no_sign else tower.signs.of(factor).value
         is_nested = power % 2 and bool(tower.squares.keys() & used(factor))
@@ -98,7 +98,7 @@ def _plain_root(tower: Tower, p: fmpq_mpoly, *, any_sign: bool = False) -> Quoti
 
 
 def _through_conjugate(tower: Tower, p: fmpq_mpoly) -> Quotient | None:
-    """√p = √(p q)/√q, for a root √q of the tower with p q the square of something plain: √(√2 − 1) = 1/√(√2 + 1)."""
+    """√p = √(p q)/√q, for a root √q of the tower and a p q whose root is not nested: √(√2 − 1) = 1/√(√2 + 1)."""
     for index, q in reversed(list(tower.squares.items())):
         if tower.generators[index].kind != "root" or not tower.generators[index].strict:
             continue
@@ -117,7 +117,7 @@ _FACTORED_BITS = 64
 
 
 class Tower(PolynomialRing):
-    """Generators with their relations and signs, and the arithmetic of quotients modulo them."""
+    """Generators with relations and signs, and the absolute values and roots of quotients."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -151,29 +151,28 @@ class Tower(PolynomialRing):
     # --- absolute values and roots ----------------------------------------------------------------------------------
 
     def ratio(self, a: Quotient, b: Quotient) -> Fraction | None:
-        """The number c with a = c b, where there is one; nothing is divided for it."""
-        above = self.reduce(self.times(a.numerator, b.denominator))
-        below = self.reduce(self.times(b.numerator, a.denominator))
-        if not above or not below:
+        """The number c with a = c b, found without a division; None without one."""
+        left = self.reduce(self.times(a.numerator, b.denominator))
+        right = self.reduce(self.times(b.numerator, a.denominator))
+        if not left or not right:
             return None
-        c = above.leading_coefficient() / below.leading_coefficient()
-        return Fraction(int(c.p), int(c.q)) if above == below * c else None
+        c = left.leading_coefficient() / right.leading_coefficient()
+        return as_fraction(c) if left == right * c else None
 
     def sign(self, value: Quotient) -> Sign:
         """The sign of a quotient where it is defined."""
-        above, below = self.signs.of(value.numerator), self.signs.of(value.denominator)
-        return Sign(above.value * below.value, above.strict)
+        numerator, denominator = self.signs.of(value.numerator), self.signs.of(value.denominator)
+        return Sign(numerator.value * denominator.value, numerator.strict)
 
     def declare(self, value: Quotient, *, strict: bool = True) -> None:
-        """value > 0, or >= 0 where it is not strict."""
-        below = self.signs.of(value.denominator)
-        above = value.numerator if below.value else self.times(value.numerator, value.denominator)
-        self.signs.declare(above, Sign(below.value or 1, strict))
+        """Assumes value > 0, or >= 0 where it is not strict."""
+        denominator = self.signs.of(value.denominator)
+        p = value.numerator if denominator.value else self.times(value.numerator, value.denominator)
+        self.signs.declare(p, Sign(denominator.value or 1, strict))
 
     def absolute(self, value: Quotient) -> Quotient:
-        """|value|, factor by factor; a factor of unknown sign becomes a root of its square."""
-        above, below = (self.polynomial(self._absolute(part)) for part in (value.numerator, value.denominator))
-        return above / below
+        """|value|, factor by factor; the absolute value of a factor of unknown sign is the root of its square."""
+        return self.polynomial(self._absolute(value.numerator)) / self.polynomial(self._absolute(value.denominator))
 
     def _absolute(self, p: fmpq_mpoly) -> fmpq_mpoly:
         constant, factors = p.factor()
@@ -185,16 +184,16 @@ class Tower(PolynomialRing):
         return result
 
     def root(self, value: Quotient) -> Quotient:
-        """√value >= 0; raises Unprovable where value is negative all over the domain."""
+        """√value >= 0; raises Unprovable for a value that is negative on the whole domain."""
         square = self.times(value.numerator, value.denominator)
         if not square:
             return self.number(0)
         return self._root(square) / self.polynomial(self._absolute(value.denominator))
 
     def _root(self, p: fmpq_mpoly) -> Quotient:
-        """√p: squares come out as absolute values, factors of known sign as roots of their own."""
+        """√p: absolute values of squares, times a root for each factor of known sign and one for the others."""
         constant, factors = p.factor()
-        outside, rest, sign = self.one, self.one, 1 if constant > 0 else -1
+        outside, radicand, sign = self.one, self.one, 1 if constant > 0 else -1
         roots = []
         for factor, power in factors:
             outside = self.times(outside, self._absolute(self.raised(factor, int(power) // 2)))
@@ -204,9 +203,9 @@ class Tower(PolynomialRing):
                     roots.append(self._simplest_root(factor * known))
                     sign *= known
                 else:
-                    rest = self.times(rest, factor)
-        if rest != self.one:
-            roots.append(self._simplest_root(rest * sign))
+                    radicand = self.times(radicand, factor)
+        if radicand != self.one:
+            roots.append(self._simplest_root(radicand * sign))
         elif sign < 0:
             raise Unprovable(
                 "A square root of a negative number.", "Check the formula, or the domain it is claimed on."
@@ -222,7 +221,7 @@ class Tower(PolynomialRing):
         return self.polynomial(self.gens[self.root_of(square)])
 
     def known_root(self, square: fmpq_mpoly) -> int | None:
-        """The generator √square, None before the first."""
+        """The generator √square, None before it is made."""
         return self._roots.get(str(square))
 
     def root_of_number(self, value: Any) -> Quotient:
@@ -247,10 +246,10 @@ class Tower(PolynomialRing):
         return self._roots[key]
 
 
-# Membership in the ideal of a few polynomial relations: the proof that they force another polynomial to be 0.
+# Membership in the ideal of a few polynomial relations: the proof that another polynomial is 0 where they are.
 
 
-# elements of the basis, terms and bits of each: more is abandoned, which leaves the verdict undecided
+# elements of the basis, terms and bits of each: beyond, the basis is abandoned and the verdict stays undecided
 _LIMITS = (60, 2_000, 4_096)
 
 
@@ -259,20 +258,20 @@ def forces_zero(
 ) -> bool:
     """True only where ``p`` is a combination of ``relations`` with polynomial factors, so 0 where they all are.
 
-    radical: also where a power of ``p`` is (Rabinowitsch: the relations and 1 − y p = 0 exclude each other).
-    never_zero: also where ``p`` times powers of these is (saturation: 1 − z Π never_zero joins the relations).
+    radical: or where a power of ``p`` is one (Rabinowitsch: the relations and 1 − y p = 0 exclude each other).
+    never_zero: or where ``p`` times powers of these is one (saturation: 1 − z Π never_zero joins the relations).
     """
     if not p:
         return True
-    names = sorted(set().union(used(p), *(used(relation) for relation in (*relations, *never_zero))))
-    context = fmpz_mpoly_ctx.get([*(f"x{index}" for index in names), "y", "z"], Ordering.degrevlex)
+    indices = sorted(set().union(used(p), *(used(relation) for relation in (*relations, *never_zero))))
+    context = fmpz_mpoly_ctx.get([*(f"x{index}" for index in indices), "y", "z"], Ordering.degrevlex)
 
     def integral(q: Any) -> Any:
-        terms = {(*(monomial[index] for index in names), 0, 0): c for monomial, c in q.to_dict().items()}
+        terms = {(*(monomial[index] for index in indices), 0, 0): c for monomial, c in q.to_dict().items()}
         common = lcm(*(int(coefficient.q) for coefficient in terms.values()))
         return context.from_dict({monomial: int(c.p) * (common // int(c.q)) for monomial, c in terms.items()})
 
-    # whatever the limits leave out of a basis, what reduces to 0 is in the ideal
+    # the basis may be incomplete; a polynomial that reduces to 0 is in the ideal all the same
     generators = [integral(relation) for relation in relations]
     if never_zero:
         product = context.gens()[-1]
@@ -283,8 +282,8 @@ def forces_zero(
         return True
     if not radical:
         return False
-    off = 1 - context.gens()[-2] * integral(p)
-    return any(element.is_constant() and element for element in _basis([*generators, off], context))
+    inverse = 1 - context.gens()[-2] * integral(p)
+    return any(element.is_constant() and element for element in _basis([*generators, inverse], context))
 
 
 def _basis(generators: Sequence[Any], context: Any) -> Any:

@@ -1,11 +1,11 @@
-"""A parser of formulas that people send: text in, sympy expression out; nothing is ever evaluated as code.
+"""A parser of untrusted formulas: from text to SymPy expressions, without evaluation of code.
 
     expression := term (("+" | "-") term)*          term  := factor (("*" | "/") factor)*
     factor     := ("+" | "-") factor | power        power := atom (("^" | "**") factor)?
     atom       := number | name | function "(" expression ("," expression)* ")" | "(" expression ")"
 
-Length, depth, number of nodes, size of numbers, degree and number of terms when expanded are bounded before anything
-is built, so that no formula can take more than its share of time and memory.
+Length, depth, number of nodes, size of numbers, degree and number of terms when expanded are bounded before an
+expression is built, so that no formula takes much time or memory.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from heavytop.errors import InputError, quoted
 from heavytop.features.claims.algebra import elliptic
 from heavytop.features.claims.algebra.conditions import ConditionKind, Need, condition
 from heavytop.features.claims.algebra.elliptic import FORMULAS
+from heavytop.features.claims.algebra.ring import as_fraction
 from heavytop.features.claims.algebra.statement import TIME, Setting
 from heavytop.features.claims.algebra.structure import Defined
 from heavytop.precision import exact
@@ -48,7 +49,7 @@ NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 
 
 class ExpressionBounds(NamedTuple):
-    """Bounds on what an expression can grow into: nodes, bits of its numbers, degree, terms when expanded."""
+    """Bounds on the size of an expression: nodes, bits of its numbers, degree, terms when expanded."""
 
     nodes: int
     bits: int
@@ -58,7 +59,7 @@ class ExpressionBounds(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Formula:
-    """A parsed formula with the bounds on its size, and what it needs to be defined and real as it is written."""
+    """A parsed formula with bounds on its size, and its needs to be defined and real as it is written."""
 
     expression: sympy.Expr
     size: ExpressionBounds
@@ -66,30 +67,32 @@ class Formula:
 
 
 def symbol(expression: sympy.Expr) -> Formula:
-    """A name that formulas may use."""
+    """The formula of a name."""
     return Formula(expression, ExpressionBounds(1, 0, 1, 1))
 
 
 class TooLarge(InputError):
-    """A formula that grows beyond the bounds on its size."""
+    """A formula beyond the bounds on its size."""
 
 
 def parse(text: str, names: Mapping[str, Formula], where: str) -> Formula:
-    """The formula that ``text`` says in ``names``; ``where`` says in error texts which formula it is.
+    """The formula of ``text`` in ``names``; where: its name in error texts.
 
-    Definitions are put in; where the formula grows too large by that, they are kept as names with a meaning.
-    Raises InputError for anything else than the grammar above, and beyond the bounds on its size.
+    Definitions are substituted; where the formula becomes too large, they stay symbols with a meaning.
+    Raises InputError for a text outside the grammar above, and beyond the bounds on its size.
     """
     try:
         return _parse(text, names, where)
     except TooLarge:
-        kept = {name: _kept(name, formula) if formula.size.nodes > 1 else formula for name, formula in names.items()}
-        return _parse(text, kept, where)
+        symbols = {
+            name: _defined(name, formula) if formula.size.nodes > 1 else formula for name, formula in names.items()
+        }
+        return _parse(text, symbols, where)
 
 
 @lru_cache(maxsize=1_000)
-def _kept(name: str, formula: Formula) -> Formula:
-    """A definition as a name, always the same one for the same formula."""
+def _defined(name: str, formula: Formula) -> Formula:
+    """A definition as a symbol, the same one for the same formula."""
     return replace(symbol(Defined(name, formula.expression)), needs=formula.needs)
 
 
@@ -106,9 +109,9 @@ Part = TypeVar("Part")
 
 
 class Descent:
-    """The base of recursive descents over the grammar: the tokens of a text, taken one by one, and a depth.
+    """The base of recursive-descent parsers: the tokens of a text, and the depth of nesting.
 
-    token: what a token is, white space before it.  deepest: how deep parentheses and powers may stand in one another.
+    token: the pattern of a token with white space before it.  deepest: the limit of nested parentheses and powers.
     """
 
     token = re.compile(rf"\s*(?:{NUMBER}|[A-Za-z]\w*|\*\*|[-+*/^(),])", re.ASCII)
@@ -137,8 +140,8 @@ class Descent:
 
     def _require(self, token: str) -> None:
         if not self._take(token):
-            there = self._next()[:20]
-            raise self._error(f"{token!r} expected {f'before {there!r}' if there else 'at the end'}")
+            following = self._next()[:20]
+            raise self._error(f"{token!r} expected {f'before {following!r}' if following else 'at the end'}")
 
     @contextmanager
     def _deeper(self, what: str) -> Iterator[None]:
@@ -148,17 +151,17 @@ class Descent:
         yield
         self._depth -= 1
 
-    def _arguments(self, one: Callable[[], Part]) -> list[Part]:
-        """The arguments in parentheses, between commas."""
+    def _arguments(self, parse_argument: Callable[[], Part]) -> list[Part]:
+        """The arguments in parentheses, separated by commas."""
         self._require("(")
-        arguments = [one()]
+        arguments = [parse_argument()]
         while self._take(","):
-            arguments.append(one())
+            arguments.append(parse_argument())
         self._require(")")
         return arguments
 
     def end(self) -> None:
-        """Raises an error if anything is left."""
+        """Raises an error for remaining tokens."""
         if self._next():
             raise self._error(f"{self._next()[:20]!r} was not expected")
 
@@ -170,7 +173,7 @@ class Descent:
 
 
 class _Parser(Descent):
-    """The formula that a text says in names; ``where`` says in error texts which one it is."""
+    """The parser of :func:`parse`."""
 
     def __init__(self, text: str, names: Mapping[str, Formula], where: str) -> None:
         self._names = names
@@ -187,7 +190,7 @@ class _Parser(Descent):
         return InputError(f"{self._where}: {what}.", "See `heavytop docs claims-in-toml` for what a formula may hold.")
 
     def sum(self) -> Formula:
-        """The expression from here on."""
+        """Parses a sum."""
         with self._deeper("parentheses"):
             total = self._term()
             while sign := self._take("+", "-"):
@@ -266,7 +269,7 @@ class _Parser(Descent):
             raise self._error(f"the number {token[:20]!r} is too large or too small")
         value = exact(token)
         bits = value.numerator.bit_length() + value.denominator.bit_length()
-        return self._checked(sympy.Rational(value.numerator, value.denominator), ExpressionBounds(1, bits, 0, 1))
+        return self._checked(sympy.Rational(value), ExpressionBounds(1, bits, 0, 1))
 
     def _name(self, token: str) -> Formula:
         if token not in self._names:
@@ -307,12 +310,12 @@ def _added(a: ExpressionBounds, b: ExpressionBounds) -> ExpressionBounds:
     return ExpressionBounds(a.nodes + b.nodes + 1, max(a.bits, b.bits) + 1, max(a.degree, b.degree), a.terms + b.terms)
 
 
-# What a file assumes of its parameters: ``assume = ["alpha > 0", "I1 > I3", "k < 1", "g != 0"]``.
+# The assumptions of a file on its parameters: ``assume = ["alpha > 0", "I1 > I3", "k < 1", "g != 0"]``.
 
 
 Bound = tuple[sympy.Expr, sympy.Expr]
 Comparison = tuple[sympy.Expr, sympy.Expr, ConditionKind]
-"""left, right, and what left − right is."""
+"""left, right, and the condition on left − right."""
 SIGNS = {">": ConditionKind.POSITIVE, ">=": ConditionKind.NONNEGATIVE, "!=": ConditionKind.NONZERO}
 _OR = {"assume": ", formula >= formula, or formula != formula", "where of [quadrature]": ""}
 
@@ -320,7 +323,7 @@ _OR = {"assume": ", formula >= formula, or formula != formula", "where of [quadr
 def comparisons(text: str, where: str) -> list[tuple[str, str, ConditionKind]]:
     """(larger, smaller, kind) of ``formula > formula``, and of each link of a chain such as ``0 < k <= 1``.
 
-    Raises InputError for anything else.
+    Raises InputError for any other text.
     """
     parts = [part.strip() for part in re.split(r"([<>]=?)", text)]
     sides, signs = parts[::2], parts[1::2]
@@ -331,7 +334,7 @@ def comparisons(text: str, where: str) -> list[tuple[str, str, ConditionKind]]:
 
 
 def assumptions(texts: Iterable[str]) -> Iterator[tuple[str, str, ConditionKind]]:
-    """(left, right, kind) of the comparisons of ``assume``, and of each !=; raises InputError for anything else."""
+    """(left, right, kind) of the comparisons of ``assume``; raises InputError for any other text."""
     for text in texts:
         left, sign, right = (part.strip() for part in text.partition("!="))
         if not sign:
@@ -348,40 +351,40 @@ def assume(
     moments: Iterable[sympy.Expr],
     symbols: Iterable[sympy.Symbol],
 ) -> Setting:
-    """Consequences of what is compared, from what this needs to be real, and from positive moments."""
+    """The setting of comparisons, of the needs of their formulas, and of positive moments."""
     sides: dict[ConditionKind, list[Bound]] = {kind: [] for kind in ConditionKind}
     for left, right, kind in compared:
         sides[kind].append((left, right))
-    bounds, at_least = sides[ConditionKind.POSITIVE], sides[ConditionKind.NONNEGATIVE]
-    for pairs in (bounds, at_least):
+    strict, weak = sides[ConditionKind.POSITIVE], sides[ConditionKind.NONNEGATIVE]
+    for pairs in (strict, weak):
         pairs += [implied for pair in pairs for implied in _through_monotone(pair)]
     symbols = list(symbols)
     positive = tuple(symbol for symbol in symbols if symbol.is_positive)
     greater: list[tuple[sympy.Symbol, sympy.Expr]] = []
     facts: list[sympy.Expr] = []
     below: dict[sympy.Symbol, set[sympy.Symbol]] = {}
-    for left, right in bounds:
+    for left, right in strict:
         if left in positive and right == 0:
             continue
-        # one bound below becomes a form of the symbol; forms may not go round in a circle
+        # one lower bound becomes a form of the symbol; no form may depend on itself
         reached = set(right.free_symbols).union(*(below.get(symbol, set()) for symbol in right.free_symbols))
         if left in symbols and left not in below and left not in reached:
             greater.append((left, right))
             below[left] = reached
-            for others in below.values():
-                if left in others:
-                    others |= reached
+            for symbols_below in below.values():
+                if left in symbols_below:
+                    symbols_below |= reached
         else:
             facts.append(left - right)
     facts += [moment for moment in moments if not moment.is_positive]
-    asked = sorted(needs, key=lambda need: need.text)
-    facts += [need.expression for need in asked if need.kind is ConditionKind.POSITIVE]
-    facts += [need.expression**2 for need in asked if need.kind is ConditionKind.NONZERO]
+    needed: dict[ConditionKind, list[sympy.Expr]] = {kind: [] for kind in ConditionKind}
+    for need in sorted(needs, key=lambda need: need.text):
+        needed[need.kind].append(need.expression)
+    facts += [*needed[ConditionKind.POSITIVE], *(e**2 for e in needed[ConditionKind.NONZERO])]
     facts += [(left - right) ** 2 for left, right in sides[ConditionKind.NONZERO]]
-    weak = [need.expression for need in asked if need.kind is ConditionKind.NONNEGATIVE]
-    weak += [left - right for left, right in at_least]
-    ranges = tuple(_ranges([*bounds, *at_least]))
-    return Setting(TIME, positive, tuple(greater), facts=tuple(facts), ranges=ranges, weak=tuple(weak))
+    nonnegative = (*needed[ConditionKind.NONNEGATIVE], *(left - right for left, right in weak))
+    ranges = tuple(_ranges([*strict, *weak]))
+    return Setting(TIME, positive, tuple(greater), facts=tuple(facts), ranges=ranges, weak=nonnegative)
 
 
 _MONOTONE: dict[Any, tuple[int, Callable[[arb], arb], Callable[[arb], bool]]] = {
@@ -398,36 +401,35 @@ _MONOTONE: dict[Any, tuple[int, Callable[[arb], arb], Callable[[arb], bool]]] = 
 
 
 def _through_monotone(bound: Bound) -> Iterator[Bound]:
-    """Consequences of left > right for the arguments of monotone functions: of both sides, or of one beside a fraction.
+    """Consequences of left > right for arguments of monotone functions: the same on both sides, or one and a fraction.
 
     The inverse of a fraction is rounded outwards to a fraction.
     """
-    (left, of_left), (right, of_right) = map(_monotone_argument, bound)
+    (left, left_argument), (right, right_argument) = map(_monotone_argument, bound)
     if left is None and right is None:
         return
     if left is right:
-        implied = (of_left, of_right)
+        implied = (left_argument, right_argument)
         sign = _MONOTONE[left][0]
     else:
-        inner, number = (of_left, bound[1]) if right is None else (of_right, bound[0])
+        argument, number = (left_argument, bound[1]) if right is None else (right_argument, bound[0])
         if not number.is_Rational:
             return
         sign, inverse, is_value = _MONOTONE[left if right is None else right]
         value = arb(fmpq(int(number.p), int(number.q)))
         if not is_value(value):
             return
-        around = inverse(value)
-        below = (right is None) == (sign > 0)  # whether the inverse lies below the argument
-        edge = (around.lower() if below else around.upper()).fmpq()
-        edge = sympy.Rational(int(edge.p), int(edge.q))
-        implied = (inner, edge) if right is None else (edge, inner)
+        enclosure = inverse(value)
+        is_lower = (right is None) == (sign > 0)  # whether the inverse is a lower bound of the argument
+        end = sympy.Rational(as_fraction((enclosure.lower() if is_lower else enclosure.upper()).fmpq()))
+        implied = (argument, end) if right is None else (end, argument)
     implied = implied if sign > 0 else implied[::-1]
     yield implied
     yield from _through_monotone(implied)
 
 
 def _monotone_argument(e: sympy.Expr) -> tuple[Any, sympy.Expr]:
-    """A monotone function and its argument; None and the expression for any other."""
+    """A monotone function and its argument; None and the expression of any other."""
     if e.is_Pow and e.exp == sympy.Rational(1, 2):
         return sympy.sqrt, e.base
     return (e.func, e.args[0]) if e.func in _MONOTONE and len(e.args) == 1 else (None, e)
@@ -438,5 +440,4 @@ def _ranges(bounds: Sequence[Bound]) -> Iterable[tuple[sympy.Symbol, tuple[Fract
     lower = {left: right for left, right in bounds if left.is_Symbol and right.is_Rational}
     upper = {right: left for left, right in bounds if right.is_Symbol and left.is_Rational}
     for symbol in lower.keys() & upper.keys():
-        low, high = lower[symbol], upper[symbol]
-        yield symbol, (Fraction(int(low.p), int(low.q)), Fraction(int(high.p), int(high.q)))
+        yield symbol, (Fraction(lower[symbol]), Fraction(upper[symbol]))

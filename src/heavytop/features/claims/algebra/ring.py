@@ -1,4 +1,4 @@
-"""Polynomials over FLINT in generators, some of which are square roots of polynomials in those before them."""
+"""Polynomials over FLINT in generators, some of which are square roots of polynomials in earlier generators."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from heavytop.errors import HeavyTopError
 
 SLOTS = 64
 _MAX_PRODUCT = 10_000
-"""Terms of a product: the paper's claims need 95, and what needs much more does not end."""
+"""Terms of a product: the paper's claims need 95; proofs that need many more do not end."""
 _MAX_QUOTIENT = 1_500
 """Terms of numerator times denominator where a common factor is sought: the paper's claims need 600."""
 
 
 class Unprovable(HeavyTopError):
-    """An expression that the exact algebra cannot carry: it leaves the verdict to the balls, and so undecided."""
+    """An expression beyond the exact algebra: balls decide, or the claim stays undecided."""
 
 
 _P = ParamSpec("_P")
@@ -28,21 +28,24 @@ _T = TypeVar("_T")
 
 
 def where_provable(otherwise: Any) -> Callable[[Callable[_P, _T]], Callable[_P, _T]]:
-    """The answer of a function, and this one where the algebra cannot carry what it is about."""
+    """A decorator: the function returns ``otherwise`` where it raises Unprovable."""
 
     def decorated(function: Callable[_P, _T]) -> Callable[_P, _T]:
-        unknown: _T = otherwise
-
         @wraps(function)
-        def answer(*args: _P.args, **kwargs: _P.kwargs) -> _T:
+        def provable(*args: _P.args, **kwargs: _P.kwargs) -> _T:
             try:
                 return function(*args, **kwargs)
             except Unprovable:
-                return unknown
+                return otherwise  # type: ignore[no-any-return]
 
-        return answer
+        return provable
 
     return decorated
+
+
+def as_fraction(value: Any) -> Fraction:
+    """A rational number of FLINT."""
+    return Fraction(int(value.p), int(value.q))
 
 
 def used(p: fmpq_mpoly) -> set[int]:
@@ -52,9 +55,9 @@ def used(p: fmpq_mpoly) -> set[int]:
 
 @dataclass(frozen=True, slots=True)
 class Quotient:
-    """numerator / denominator, reduced by its tower; arithmetic with others of that tower, and with fractions.
+    """numerator / denominator, reduced by its tower; arithmetic with quotients of that tower and with fractions.
 
-    Raises Unprovable where the result is too large, or is divided by 0.
+    Raises Unprovable for results that are too large, and for a division by 0.
     """
 
     numerator: fmpq_mpoly
@@ -103,9 +106,9 @@ class Quotient:
 
 @dataclass(frozen=True, slots=True)
 class Generator:
-    """One generator: what it stands for, whether it is constant in time, and what is known of its sign.
+    """A generator: its meaning, whether it is constant in time, and its sign.
 
-    sign: 1 or -1 where it is so all over the domain, 0 allowed; else 0.  strict: it is never 0.
+    sign: 1 for >= 0, -1 for <= 0 on the whole domain, 0 for unknown.  strict: it is never 0.
     kind: ``symbol``, ``number``, ``root`` (√arguments[0]) or the name of a function of ``arguments``.
     """
 
@@ -129,7 +132,7 @@ class PolynomialRing:
         self.generators: list[Generator] = []
         self.squares: dict[int, fmpq_mpoly] = {}
         self.one = self.context.constant(1)
-        # what has been divided by so far, by its text: nothing is proven where one of them is 0
+        # divisors of all divisions so far, by their texts: nothing is proven where one of them is 0
         self.divisors: dict[str, fmpq_mpoly] = {}
 
     def add(self, generator: Generator) -> int:
@@ -173,8 +176,8 @@ class PolynomialRing:
         """The coefficients of the powers of one generator."""
         parts: dict[int, dict[Any, Any]] = {}
         for monomial, coefficient in p.to_dict().items():
-            rest = (*monomial[:index], 0, *monomial[index + 1 :])
-            parts.setdefault(int(monomial[index]), {})[rest] = coefficient
+            cofactor = (*monomial[:index], 0, *monomial[index + 1 :])
+            parts.setdefault(int(monomial[index]), {})[cofactor] = coefficient
         return {power: self.context.from_dict(terms) for power, terms in parts.items()}
 
     # --- quotients --------------------------------------------------------------------------------------------------
@@ -188,7 +191,7 @@ class PolynomialRing:
         return Quotient(self.context.constant(fmpq(value.numerator, value.denominator)), self.one, self)
 
     def quotient(self, numerator: fmpq_mpoly, denominator: Any) -> Quotient:
-        """Reduced, with no root left in the denominator; raises Unprovable where that is 0."""
+        """The reduced quotient without roots in the denominator; raises Unprovable for a denominator 0."""
         numerator, denominator = self.reduce(numerator), self.reduce(denominator)
         degrees = denominator.degrees()
         for index in sorted(self.squares, reverse=True):

@@ -1,6 +1,6 @@
-"""The sign of a polynomial in the generators of a ring, all over the domain of the claim.
+"""The sign of a polynomial in the generators of a ring on the whole domain of the claim.
 
-Every rule here is a proof.  What no rule decides is unknown, and a condition that needs it stays undischarged.
+Every rule is a proof.  A sign that no rule decides is unknown, and a condition that needs it stays undischarged.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from fractions import Fraction
+from math import prod
 from typing import Any, NamedTuple
 
 import sympy
@@ -15,7 +16,7 @@ from flint import arb, fmpq, fmpq_mpoly
 
 from heavytop.exact.flint.balls import working_precision
 from heavytop.features.claims.algebra.combinations import nonnegative_combination
-from heavytop.features.claims.algebra.ring import Generator, PolynomialRing, Unprovable, used
+from heavytop.features.claims.algebra.ring import Generator, PolynomialRing, Unprovable, as_fraction, used
 
 NUMBER_BITS = 512
 """Working precision of the balls of generators that are numbers."""
@@ -31,13 +32,26 @@ class Sign(NamedTuple):
         """The sign of a product."""
         return Sign(self.value * other.value, self.strict and other.strict)
 
+    def also(self, other: Sign) -> Sign:
+        """The sign of one expression by two proofs, each of its value or of its strictness."""
+        return Sign(self.value or other.value, self.strict or other.strict)
+
+    def between(self, other: Sign) -> Sign:
+        """The sign of all values between two with these signs."""
+        return Sign(self.value, self.strict and other.strict) if self.value == other.value != 0 else UNKNOWN
+
 
 UNKNOWN = Sign(0, False)
-PLUS = Sign(1, True)
+PLUS, MINUS = Sign(1, True), Sign(-1, True)
+
+
+def sign_of_number(value: Any) -> Sign:
+    """The sign of a number other than 0."""
+    return PLUS if value > 0 else MINUS
 
 
 def value_of(p: fmpq_mpoly, numbers: Mapping[int, arb]) -> arb:
-    """The ball of a polynomial at those of its generators."""
+    """The ball of a polynomial at the balls of its generators."""
     with working_precision(NUMBER_BITS):
         total = arb(0)
         for monomial, coefficient in p.to_dict().items():
@@ -50,7 +64,7 @@ def value_of(p: fmpq_mpoly, numbers: Mapping[int, arb]) -> arb:
 
 
 def sum_of(signs: Iterable[Sign]) -> Sign:
-    """The sign of a sum: that of its parts where they have one and the same."""
+    """The sign of a sum whose parts have one sign; UNKNOWN of others."""
     values, strict = set(), False
     for value, part_strict in signs:
         values.add(value)
@@ -61,24 +75,24 @@ def sum_of(signs: Iterable[Sign]) -> Sign:
 
 
 _DEPTH = 4
-# calls a question: what takes more is abandoned
+# factors looked at for one polynomial: beyond, its sign is unknown
 _BUDGET = 120
 _MAX_TERMS = 200
-# terms of what is taken apart further than into factors
-_MAX_PARTED = 40
+# terms of a factor that the costly rules are tried for
+_MAX_COSTLY_TERMS = 40
 _MAX_DEGREE = 24
-# atoms and products of a combination, their degree, and linear programs a tower
+# atoms and products of a combination, their degree, and linear programs per tower
 _MAX_ATOMS = 10
 _MAX_PRODUCTS = 150
 _MAX_DEGREE_OF_PRODUCTS = 4
 _PROGRAMS = 30
 _MOST_FACTORED = 10_000
 _factors: dict[str, Any] = {}
-"""Of polynomials by their texts: all rings name their generators alike, in one context of FLINT."""
+"""Factors of polynomials by their texts: all rings have the same names of generators, in one context of FLINT."""
 
 
 class Signs:
-    """The known signs and ranges of the generators of ``ring``, and what follows for polynomials.
+    """The known signs and ranges of the generators of ``ring``, and the signs of polynomials that follow.
 
     ranges: closed intervals of generators.  circles: cosine of each sine.  numbers: the ball of each generator that
     is a number.  pi: the generator π.  turns: the ends, over π, of open intervals in which generators lie.
@@ -102,22 +116,22 @@ class Signs:
         self.turns: dict[int, tuple[Fraction, Fraction]] = {}
 
     def declare_form(self, index: int, form: fmpq_mpoly, *, below_one: bool = False) -> None:
-        """Generator ``index`` is ``form``, a polynomial in generators of known sign; below_one: 1/x is, 0 < x ≤ 1."""
+        """Generator ``index`` equals ``form``, a polynomial in generators of known sign; below_one: 1/x does."""
         self._forms[index] = form
         self._below_one |= {index} if below_one else set()
         self._known.clear()
 
     def can_have_form(self, index: int, form: fmpq_mpoly) -> bool:
-        """Whether ``form`` may be declared: it is the first, and nothing in it has the form of its reciprocal."""
+        """Whether ``form`` may be declared: it is the first, and no generator in it is declared by its reciprocal."""
         return index not in self._forms and not self._below_one & used(form)
 
     def declare(self, p: fmpq_mpoly, sign: Sign) -> None:
-        """The claim assumes this sign of ``p``: it is that of the factors whose sign nothing else tells.
+        """Assumes this sign of ``p``, and so the sign of the product of its factors of unknown sign.
 
-        A sign that is not strict tells nothing of a factor where another may be 0.
+        A sign that is not strict determines no factor where another may be 0.
         """
         constant, factors = self.factors(p)
-        total = Sign(1 if constant > 0 else -1, True)
+        total = sign_of_number(constant)
         open_factors = []
         for factor, power in factors:
             known = self._by_terms(factor)
@@ -134,15 +148,12 @@ class Signs:
         if len(open_factors) == 1:
             self._facts.append((open_factors[0], known))
         elif open_factors:
-            product = self._ring.one
-            for factor in open_factors:
-                product = product * factor
-            self._products.append((product, known))
+            self._products.append((prod(open_factors, start=self._ring.one), known))
             self._declare_each(open_factors, known)
         self._known.clear()
 
     def _declare_each(self, factors: list[fmpq_mpoly], known: Sign) -> None:
-        """Two factors whose product is > 0 have the sign of their sum, where that is known; or of a difference."""
+        """Two factors with a product > 0 have the sign of their sum; with a product < 0, of their difference."""
         if len(factors) != 2 or not (known.value and known.strict):
             return
         first, second = factors
@@ -152,7 +163,7 @@ class Signs:
             self._facts += [(first, Sign(total.value, True)), (second, Sign(total.value * known.value, True))]
 
     def never_zero(self, relations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly]:
-        """Polynomials that are 0 nowhere and have to do with these: facts, their own factors, generators in them."""
+        """Polynomials that are 0 nowhere and share generators with these: facts, factors, generators."""
         indices = set().union(*map(used, relations))
         nonzero = [fact for fact, sign in (*self._facts, *self._products) if sign.strict and used(fact) & indices]
         nonzero += [self._ring.gens[index] for index in sorted(indices) if self._ring.generators[index].strict]
@@ -161,7 +172,7 @@ class Signs:
         return list({str(p): p for p in nonzero}.values())
 
     def factors(self, p: fmpq_mpoly) -> Any:
-        """(constant, [(factor, power)]), made once for all rings."""
+        """(constant, [(factor, power)]), computed once for all rings."""
         key = str(p)
         if key not in _factors:
             if len(_factors) == _MOST_FACTORED:
@@ -174,24 +185,22 @@ class Signs:
         if not p:
             return Sign(1, False)
         if p.is_constant():
-            return Sign(1 if p.leading_coefficient() > 0 else -1, True)
+            return sign_of_number(p.leading_coefficient())
         if self._depth == 0:
             self._left = _BUDGET
         if self._depth > _DEPTH or self._left <= 0 or len(p) > _MAX_TERMS or max(p.degrees()) > _MAX_DEGREE:
             return UNKNOWN
         for product, sign in self._products:
-            quotient, rest = divmod(p, product)
-            if not rest:
+            quotient, remainder = divmod(p, product)
+            if not remainder:
                 return self.of(quotient).times(sign)
         self._depth += 1
         try:
             constant, factors = self.factors(p)
-            total = Sign(1 if constant > 0 else -1, True)
+            total = sign_of_number(constant)
             for factor, power in factors:
-                known = self._of_factor(factor)
-                if power % 2 == 0:
-                    known = Sign(1, known.strict)
-                total = total.times(known)
+                sign = self._of_factor(factor)
+                total = total.times(sign if power % 2 else Sign(1, sign.strict))
             return total
         except Unprovable:
             return UNKNOWN
@@ -205,27 +214,21 @@ class Signs:
             if (known.value and known.strict) or depth <= self._depth:
                 return known
         self._left -= 1
-        sign_of_factor = UNKNOWN
+        sign = UNKNOWN
         for rule in self._rules(p):
-            try:
-                one = rule(p)
-            except Unprovable:  # too large for this rule
-                continue
-            # a rule may tell the sign, another that it is never 0
-            sign_of_factor = Sign(sign_of_factor.value or one.value, sign_of_factor.strict or one.strict)
-            if sign_of_factor.value and sign_of_factor.strict:
+            with suppress(Unprovable):  # too large for this rule
+                sign = sign.also(rule(p))
+            if sign.value and sign.strict:
                 break
-        # what was abandoned for lack of time may be found when it is asked first
-        self._known[key] = sign_of_factor, self._depth if self._left > 0 else _DEPTH
-        return sign_of_factor
+        # where the budget was used up, the next call may find more
+        self._known[key] = sign, self._depth if self._left > 0 else _DEPTH
+        return sign
 
     def _rules(self, p: fmpq_mpoly) -> Iterator[Callable[[fmpq_mpoly], Sign]]:
         yield from (self._by_facts, self._by_number, self._by_terms, self._by_forms)
-        if len(p) <= _MAX_PARTED and self._left > 0:
-            yield self._by_square_of_a_sine
-            yield from (self._by_roots_of_one_variable, self._by_generators, self._by_half_angle)
-            yield self._by_difference_from_facts
-            yield self._by_products_of_facts
+        if len(p) <= _MAX_COSTLY_TERMS and self._left > 0:
+            yield from (self._by_square_of_a_sine, self._by_roots_of_one_variable, self._by_generators)
+            yield from (self._by_half_angle, self._by_difference_from_facts, self._by_products_of_facts)
             yield self._by_squares
 
     # --- rules ------------------------------------------------------------------------------------------------------
@@ -235,32 +238,31 @@ class Signs:
         for fact, sign in self._facts:
             ratio = p.leading_coefficient() / fact.leading_coefficient()
             if p == fact * ratio:
-                one = sign.times(Sign(1 if ratio > 0 else -1, True))
-                result = Sign(result.value or one.value, result.strict or one.strict)
+                result = result.also(sign.times(sign_of_number(ratio)))
         return result
 
     def ball(self, p: fmpq_mpoly) -> arb | None:
-        """The ball of a polynomial in numbers; None where another generator occurs."""
+        """The ball of a polynomial in generators that are numbers; None for any other."""
         return value_of(p, self.numbers) if used(p) <= self.numbers.keys() else None
 
     def _by_number(self, p: fmpq_mpoly) -> Sign:
-        """A number other than a fraction: its ball."""
+        """Irrational numbers: by the ball of p."""
         total = self.ball(p)
         if total is None or not total.is_finite() or total.contains(0):
             return UNKNOWN
-        return Sign(1 if total > 0 else -1, True)
+        return sign_of_number(total)
 
     def _by_terms(self, p: fmpq_mpoly) -> Sign:
-        """By terms of one sign; their coefficients may be numbers that are no fractions."""
+        """Terms of one sign; their coefficients may be irrational numbers."""
         if not self.numbers.keys() & used(p):
-            signs = (self._of_term(monomial, Sign(1 if c > 0 else -1, True)) for monomial, c in p.to_dict().items())
+            signs = (self._of_term(monomial, sign_of_number(c)) for monomial, c in p.to_dict().items())
             return next(signs) if len(p) == 1 else sum_of(signs)
         groups: dict[Any, dict[Any, Any]] = {}
         for monomial, coefficient in p.to_dict().items():
             number = tuple(power if index in self.numbers else 0 for index, power in enumerate(monomial))
-            rest = tuple(0 if index in self.numbers else power for index, power in enumerate(monomial))
-            groups.setdefault(rest, {})[number] = coefficient
-        signs = (self._of_term(rest, self._by_number(self._ring.context.from_dict(c))) for rest, c in groups.items())
+            cofactor = tuple(0 if index in self.numbers else power for index, power in enumerate(monomial))
+            groups.setdefault(cofactor, {})[number] = coefficient
+        signs = (self._of_term(term, self._by_number(self._ring.context.from_dict(c))) for term, c in groups.items())
         return next(signs) if len(groups) == 1 else sum_of(signs)
 
     def _of_term(self, monomial: Any, sign: Sign) -> Sign:
@@ -272,9 +274,9 @@ class Signs:
         return sign
 
     def _by_forms(self, p: fmpq_mpoly) -> Sign:
-        """By terms, after each generator is written through positive ones."""
-        turned = self._below_one & used(p)
-        for index in turned:
+        """Terms of one sign after each generator is replaced by its form in positive ones."""
+        reciprocals = self._below_one & used(p)
+        for index in reciprocals:
             # p(X) has the sign of X^n p(1/Z) with Z = 1/X >= 1
             degree = int(p.degrees()[index])
             terms = {
@@ -284,17 +286,17 @@ class Signs:
             p = self._ring.context.from_dict(terms)
         if not self._forms.keys() & used(p):
             return UNKNOWN
-        p = self._without_forms(p, turned)
+        p = self._without_forms(p, reciprocals)
         return self._by_terms(p) if p else UNKNOWN
 
-    def _without_forms(self, p: fmpq_mpoly, turned: Collection[int] = ()) -> Any:
-        """Every generator with a form written as that; raises Unprovable where that is too large.
+    def _without_forms(self, p: fmpq_mpoly, reciprocals: Collection[int] = ()) -> Any:
+        """``p`` with every generator replaced by its form; raises Unprovable where that is too large.
 
-        turned: generators that stand for their reciprocals in ``p``; others that lie below 1 are left as they are.
-        It ends, since forms do not go round in a circle.
+        reciprocals: generators that stand for their reciprocals in ``p``; others below 1 are left as they are.
+        The loop ends, since no form depends on itself.
         """
-        left = self._below_one.difference(turned)
-        while forms := self._forms.keys() & used(p) - left:
+        excluded = self._below_one.difference(reciprocals)
+        while forms := self._forms.keys() & used(p) - excluded:
             index = min(forms)
             p = self.substituted(p, index, self._forms[index])
             if len(p) > _MAX_TERMS:
@@ -309,20 +311,19 @@ class Signs:
         return total
 
     def _by_roots_of_one_variable(self, p: fmpq_mpoly) -> Sign:
-        """An irreducible polynomial in one generator without a real root in its range (Sturm)."""
+        """Irreducible polynomials in one generator without a real root in its range (Sturm)."""
         if len(used(p)) != 1:
             return UNKNOWN
         (index,) = used(p)
         low, high = self._range(index)
         x = sympy.Symbol("x")
-        coefficients = {int(monomial[index]): sympy.Rational(int(c.p), int(c.q)) for monomial, c in p.to_dict().items()}
-        polynomial = sympy.Poly(sum(c * x**power for power, c in coefficients.items()), x)
+        polynomial = sympy.Poly(sum(as_fraction(c) * x ** int(m[index]) for m, c in p.to_dict().items()), x)
         if polynomial.degree() == 1:
             return self._line(polynomial, low, high)
         if polynomial.count_roots(low, high):
             return UNKNOWN
         inside = low if low is not None else high if high is not None else sympy.Integer(0)
-        return Sign(1 if polynomial.eval(inside) > 0 else -1, True)
+        return sign_of_number(polynomial.eval(inside))
 
     def _line(self, polynomial: Any, low: Any, high: Any) -> Sign:
         """a x + b on a closed interval or ray."""
@@ -330,33 +331,27 @@ class Signs:
         ends = [polynomial.eval(end) if end is not None else None for end in (low, high)]
         if slope < 0:
             ends.reverse()
-        least, most = ends
-        if least is not None and least >= 0:
-            return Sign(1, bool(least > 0))
-        if most is not None and most <= 0:
-            return Sign(-1, bool(most < 0))
+        lowest, highest = ends
+        if lowest is not None and lowest >= 0:
+            return Sign(1, bool(lowest > 0))
+        if highest is not None and highest <= 0:
+            return Sign(-1, bool(highest < 0))
         return UNKNOWN
 
     def _range(self, index: int) -> tuple[Any, Any]:
-        """Closed interval of a generator, None for no bound."""
-        low: Any = None
-        high: Any = None
-        if index in self.ranges:
-            low, high = (sympy.Rational(end.numerator, end.denominator) for end in self.ranges[index])
-        sign = self._ring.generators[index].sign
-        if sign > 0:
-            low = sympy.Integer(0) if low is None else max(low, sympy.Integer(0))
-        if sign < 0:
-            high = sympy.Integer(0) if high is None else min(high, sympy.Integer(0))
-        return low, high
+        """The closed interval of a generator; None for no bound."""
+        zero, sign = sympy.Integer(0), self._ring.generators[index].sign
+        if index not in self.ranges:
+            return zero if sign > 0 else None, zero if sign < 0 else None
+        low, high = map(sympy.Rational, self.ranges[index])
+        return max(low, zero) if sign > 0 else low, min(high, zero) if sign < 0 else high
 
     def _by_generators(self, p: fmpq_mpoly) -> Sign:
-        """As a polynomial in one of its generators, with coefficients of known sign."""
+        """Polynomials in one of their generators with coefficients of known sign."""
         result = UNKNOWN
         for index in sorted(used(p), reverse=True):
-            parts = self._ring.by_power(p, index)
-            for one in self._as_polynomial_in(index, p, parts):
-                result = Sign(result.value or one.value, result.strict or one.strict)
+            for sign in self._as_polynomial_in(index, p, self._ring.by_power(p, index)):
+                result = result.also(sign)
                 if result.value and result.strict:
                     return result
         return result
@@ -378,17 +373,13 @@ class Signs:
             if leading.value and leading.strict and defect.value == 1:
                 yield Sign(leading.value, defect.strict)
         if degree == 1 and index in self.ranges:
-            ends = [self.substituted(p, index, self._constant(end)) for end in self.ranges[index]]
-            signs = [self.of(end) for end in ends]
-            if signs[0].value == signs[1].value != 0:
-                yield Sign(signs[0].value, signs[0].strict and signs[1].strict)
-
+            low, high = (self.of(self.substituted(p, index, self._constant(end))) for end in self.ranges[index])
+            yield low.between(high)
         if degree == 1 and index in self.turns and self.pi in used(p):
             pi = self._ring.gens[self.pi]
-            ends = [self.substituted(p, index, self._constant(end) * pi) for end in self.turns[index]]
-            first, second = (self.of(end) for end in ends)
-            if first.value == second.value != 0:
-                yield Sign(first.value, first.strict or second.strict)
+            low, high = (self.of(self.substituted(p, index, self._constant(end) * pi)) for end in self.turns[index])
+            if low.value == high.value != 0:  # of an open interval: one strict end suffices
+                yield low.also(high)
 
     def _constant(self, value: Fraction) -> fmpq_mpoly:
         return self._ring.context.constant(fmpq(value.numerator, value.denominator))
@@ -403,7 +394,7 @@ class Signs:
         return UNKNOWN
 
     def _by_half_angle(self, p: fmpq_mpoly) -> Sign:
-        """Sine 2τ/(1 + τ²) and cosine (1 − τ²)/(1 + τ²), and apart from them the angle π, where τ is infinite."""
+        """Sine 2τ/(1 + τ²) and cosine (1 − τ²)/(1 + τ²); the angle π, where τ is infinite, separately."""
         for sine, cosine in self.circles.items():
             if cosine not in used(p):
                 continue
@@ -412,23 +403,20 @@ class Signs:
             degree = max(i + j for i, j, _, _ in terms)
             total = self._ring.context.constant(0)
             for i, j, monomial, coefficient in terms:
-                rest = [0 if index in (sine, cosine) else power for index, power in enumerate(monomial)]
+                cofactor = [0 if index in (sine, cosine) else power for index, power in enumerate(monomial)]
                 factor = (2 * tau) ** i * (1 - tau**2) ** j * (1 + tau**2) ** (degree - i - j)
-                total += self._ring.context.from_dict({tuple(rest): coefficient}) * factor
-            straight = self.substituted(self.substituted(p, sine, self._constant(Fraction(0))), cosine, -self._ring.one)
-            signs = self.of(total), self.of(straight)
-            if signs[0].value == signs[1].value != 0:
-                return Sign(signs[0].value, signs[0].strict and signs[1].strict)
+                total += self._ring.context.from_dict({tuple(cofactor): coefficient}) * factor
+            at_pi = self.substituted(self.substituted(p, sine, self._constant(Fraction(0))), cosine, -self._ring.one)
+            if (sign := self.of(total).between(self.of(at_pi))).value:
+                return sign
         return UNKNOWN
 
     def _by_square_of_a_sine(self, p: fmpq_mpoly) -> Sign:
         """Linear in g² with −1 ≤ g ≤ 1: between its values at g² = 0 and g² = 1."""
         for index in used(p):
             parts = self._ring.by_power(p, index) if self.ranges.get(index) == (Fraction(-1), Fraction(1)) else {}
-            if parts.keys() == {0, 2}:
-                ends = self.of(parts[0]), self.of(parts[0] + parts[2])
-                if ends[0].value and ends[0].value == ends[1].value:
-                    return Sign(ends[0].value, ends[0].strict and ends[1].strict)
+            if parts.keys() == {0, 2} and (sign := self.of(parts[0]).between(self.of(parts[0] + parts[2]))).value:
+                return sign
         return UNKNOWN
 
     def _half_angle(self, sine: int) -> int:
@@ -440,43 +428,41 @@ class Signs:
     def _by_difference_from_facts(self, p: fmpq_mpoly) -> Sign:
         """p = q·fact + r with q and r of one sign."""
         for fact, sign in self._facts:
-            for part in (fact, -fact):
-                quotient, rest = divmod(p, part)
-                if quotient and rest and len(rest) < len(p) + len(fact):
-                    fact_sign = sign if part is fact else Sign(-sign.value, sign.strict)
-                    bound = sum_of((self.of(quotient).times(fact_sign), self.of(rest)))
+            for factor, factor_sign in ((fact, sign), (-fact, Sign(-sign.value, sign.strict))):
+                quotient, remainder = divmod(p, factor)
+                if quotient and remainder and len(remainder) < len(p) + len(fact):
+                    bound = sum_of((self.of(quotient).times(factor_sign), self.of(remainder)))
                     if bound.value:
                         return bound
         return UNKNOWN
 
-    def _at_once(self, p: fmpq_mpoly) -> Sign:
-        """The sign of ``p`` by the rules that ask for no other sign."""
+    def _directly(self, p: fmpq_mpoly) -> Sign:
+        """The sign of ``p`` by the rules that need no other sign."""
         signs = [rule(p) for rule in (self._by_facts, self._by_terms, self._by_forms)]
         return next((sign for sign in signs if sign.value), UNKNOWN)
 
     def _by_squares(self, p: fmpq_mpoly) -> Sign:
-        """With a generator g ≥ 0 written as R², where there is a root R of g."""
+        """A generator g ≥ 0 replaced by R², where the ring has the root R of g."""
         for root, square in list(self._ring.squares.items()):
             (index, *others) = used(square) or {-1}
-            alone = not others and index in used(p) and square == self._ring.gens[index]
-            # that there is a root does not make it real
-            if alone and self._at_once(square).value > 0:
+            is_generator = not others and index in used(p) and square == self._ring.gens[index]
+            # a root in the ring need not be real
+            if is_generator and self._directly(square).value > 0:
                 return self.of(self.substituted(p, index, self._ring.gens[root] ** 2))
         return UNKNOWN
 
     # --- combinations of products -----------------------------------------------------------------------------------
 
     def _by_products_of_facts(self, p: fmpq_mpoly) -> Sign:
-        """p or −p = Σ c q with c ≥ 0, each q a product of what is known to be ≥ 0."""
-        still = all(
-            g.constant and g.kind in ("symbol", "root") for g in map(self._ring.generators.__getitem__, used(p))
-        )
-        if not (self._facts or self._forms) or not still or self._programs <= 0 or self._depth > 2:
+        """p or −p = Σ c q with c ≥ 0, each q a product of atoms that are ≥ 0."""
+        generators = [self._ring.generators[index] for index in used(p)]
+        of_parameters = all(g.constant and g.kind in ("symbol", "root") for g in generators)
+        if not (self._facts or self._forms) or not of_parameters or self._programs <= 0 or self._depth > 2:
             return UNKNOWN
         p = self._ring.reduce(self._without_forms(p))
         degree = max((sum(map(int, monomial)) for monomial in p.to_dict()), default=0)
         atoms = self._atoms_for(p)
-        if not 0 < degree <= _MAX_DEGREE_OF_PRODUCTS or len(p) > _MAX_PARTED or len(atoms) < 2:
+        if not 0 < degree <= _MAX_DEGREE_OF_PRODUCTS or len(p) > _MAX_COSTLY_TERMS or len(atoms) < 2:
             return UNKNOWN
         self._programs -= 1
         products = self._products_of(atoms, degree)
@@ -487,7 +473,7 @@ class Signs:
         return UNKNOWN
 
     def _atoms_for(self, p: fmpq_mpoly) -> list[tuple[fmpq_mpoly, bool]]:
-        """(polynomial ≥ 0, whether it is never 0): facts and generators that have to do with ``p``."""
+        """(polynomial ≥ 0, whether it is never 0): facts and generators that share generators with ``p``."""
         facts = []
         for fact, sign in self._facts:
             if sign.value:
@@ -504,19 +490,19 @@ class Signs:
             near = near.union(*(used(fact) for fact, _ in more))
         for index in sorted(near):
             g, square = self._ring.generators[index], self._ring.squares.get(index)
-            is_real = square is None or index in used(p) or self._at_once(square).value > 0
+            is_real = square is None or index in used(p) or self._directly(square).value > 0
             if g.sign and index not in self._forms.keys() - self._below_one and is_real:
                 chosen.append((self._ring.gens[index] * g.sign, g.strict))
         return chosen[:_MAX_ATOMS]
 
     def _products_of(self, atoms: list[tuple[fmpq_mpoly, bool]], degree: int) -> list[tuple[fmpq_mpoly, bool]]:
-        """1 and the products of up to ``degree`` atoms, as many as are tried."""
+        """1 and the products of up to ``degree`` atoms, up to a number."""
         products = level = [(self._ring.one, True, 0)]
         for _ in range(degree):
             level = [
-                (self._ring.times(product, atom), strict and also, i)
+                (self._ring.times(product, atom), strict and atom_strict, i)
                 for product, strict, first in level
-                for i, (atom, also) in enumerate(atoms[first:], first)
+                for i, (atom, atom_strict) in enumerate(atoms[first:], first)
             ]
             if len(products) + len(level) > _MAX_PRODUCTS:
                 break

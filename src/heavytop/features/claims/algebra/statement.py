@@ -1,4 +1,4 @@
-"""The statements of a claim, and their setting."""
+"""The statements of a claim, and their setting: assumptions and samples."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ Point = dict[sympy.Symbol, Fraction]
 
 @dataclass(frozen=True, slots=True)
 class Domain:
-    """Where a statement is made.
+    """The domain of a statement.
 
     label: ``all``, ``t<=0`` or ``t>0``.  sign: the sign of the variable there, 0 for both.
-    points: exact values of the variable at which balls are taken.  note: what the label means, if not time.
+    points: exact values of the variable for witnesses.  note: the meaning of the label, if not time.
     facts: expressions that are > 0 on the domain by its definition.
     """
 
@@ -31,7 +31,7 @@ class Domain:
     facts: tuple[sympy.Expr, ...] = ()
 
 
-# the last are beyond a quarter of a period, where another branch of an inverse function shows
+# the last are beyond a quarter of a period, on another branch of inverse functions
 _BEFORE = (Fraction(-1, 2), Fraction(-7, 5), Fraction(-1, 9), Fraction(-17, 3))
 _AFTER = (Fraction(1, 2), Fraction(7, 5), Fraction(1, 9), Fraction(9, 2))
 ALL = Domain("all", 0, (*_BEFORE[:2], *_AFTER[:2], _AFTER[3], _BEFORE[3]))
@@ -43,10 +43,10 @@ AFTER = Domain("t>0", 1, _AFTER)
 class Formulas:
     """The formulas that a statement rests on.
 
-    values: must be real and continuous all over the domain.  needs: for these to be defined.
-    attitude: functions of the angles that must be continuous inside the domain.  angle_needs: for the angles.
-    pole: the condition under which the angles are defined, where they are not defined all over the domain.
-    sampled: the same needs in the symbols of the samples, where first integrals in them have got names.
+    values: must be real and continuous on the whole domain.  needs: of these.
+    attitude: functions of the angles that must be continuous inside the domain.  angle_needs: of the angles.
+    pole: the condition under which the angles are defined, where they are not on the whole domain.
+    sampled: the needs in the symbols of the samples, where ``needs`` have symbols for first integrals.
     """
 
     values: tuple[sympy.Expr, ...] = ()
@@ -59,12 +59,12 @@ class Formulas:
 
 @dataclass(frozen=True, slots=True)
 class Flow:
-    """The motion under which a first integral or relation is claimed to be kept.
+    """The flow under which a first integral or relation is claimed to be invariant.
 
-    rate: the derivative along it.  kept: the relations that have to be invariant, with their text.
+    rate: the derivative along it.  kept: the relations that have to be invariant, with their texts.
     state: the variables.  is_relation: whether the statement is that a relation stays 0.
-    always: what is 0 at every state of a body and stays so, so that a witness has to lie there: |γ|² - 1.
-    names: symbols of ``state`` that stand for a first integral, with its formula.
+    always: expressions that are 0 at every state of a body, and so at a witness: |γ|² - 1.
+    names: symbols in ``state`` that stand for a first integral, with its formula.
     """
 
     rate: Callable[[sympy.Expr], sympy.Expr]
@@ -75,16 +75,16 @@ class Flow:
     names: Mapping[sympy.Symbol, sympy.Expr] = field(default_factory=dict, hash=False)
 
     def keeps(self, e: sympy.Expr) -> bool:
-        """Whether it holds nothing of the state but names of first integrals, and at least one of them."""
-        inside = e.free_symbols & self.state
-        return bool(inside) and inside <= self.names.keys()
+        """Whether the variables in it are names of first integrals, at least one."""
+        variables = e.free_symbols & self.state
+        return bool(variables) and variables <= self.names.keys()
 
 
 @dataclass(frozen=True, slots=True)
 class Statement:
-    """One equation, component, branch and domain; it says that ``residual`` is 0.
+    """The statement that ``residual`` is 0: one component of an equation on one branch and domain.
 
-    text: the equation in words and signs.  formulas: what has to be defined for that.  flow: of a first integral.
+    text: the equation.  formulas: that it rests on.  flow: of a first integral.
     """
 
     equation: str
@@ -99,12 +99,12 @@ class Statement:
 
 @dataclass(frozen=True, slots=True)
 class Setting(Assumptions):
-    """The setting of the statements of a claim: what it assumes, and where to look for witnesses.
+    """The setting of a claim's statements: its assumptions, and samples for witnesses.
 
-    samples: exact parameter sets.  parts: names with expressions through which a residual may be written, such as γ3.
-    constants: the same for constant factors, such as k/2.
-    bodies: what the parameters have to meet for a body with the moments of the claim to exist.
-    solutions: of relations that can be solved; those in ``solved`` are put in, in the place of their relations.
+    samples: exact parameter sets.  parts: named expressions that a residual may be a multiple of, such as γ3.
+    constants: named constant factors of such a multiple, such as k/2.
+    bodies: needs of the parameters for a body with the moments of the claim to exist.
+    solutions: of relations that can be solved; ``solved`` has those used in place of their relations.
     """
 
     samples: tuple[Mapping[sympy.Symbol, Fraction], ...] = ()
@@ -114,10 +114,10 @@ class Setting(Assumptions):
     solutions: tuple[SolvedRelation, ...] = ()
 
     def with_solutions(self) -> Setting:
-        """The setting with the solutions in the place of their relations."""
-        done = {solution.relation for solution in self.solutions}
-        left = tuple(relation for relation in self.relations if relation not in done)
-        return replace(self, relations=left, solutions=(), solved=self.solutions)
+        """The setting with the solutions in place of their relations."""
+        solved = {solution.relation for solution in self.solutions}
+        relations = tuple(relation for relation in self.relations if relation not in solved)
+        return replace(self, relations=relations, solutions=(), solved=self.solutions)
 
     def assumptions(
         self,
@@ -127,7 +127,7 @@ class Setting(Assumptions):
         facts: tuple[sympy.Expr, ...] = (),
         weak: tuple[sympy.Expr, ...] = (),
     ) -> Assumptions:
-        """The assumptions of the algebra on a domain where the variable has this sign (strict: and is not 0)."""
+        """The assumptions on a domain where the variable has this sign (strict: and is not 0)."""
         facts, weak = (*self.facts, *facts), (*self.weak, *weak)
         return replace(self, variable_sign=sign, strict=strict, facts=facts, weak=weak)
 

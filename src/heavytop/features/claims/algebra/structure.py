@@ -1,26 +1,26 @@
-"""Facts from the structure of an expression, before anything is expanded: its sign, and the first integrals in it."""
+"""Properties of an expression from its tree, without expansion: its sign, its rate, and the first integrals in it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from typing import Any
 
 import sympy
 
 from heavytop.features.claims.algebra.elliptic import dn
-from heavytop.features.claims.algebra.signs import PLUS, UNKNOWN, Sign, sum_of
+from heavytop.features.claims.algebra.signs import PLUS, UNKNOWN, Sign, sign_of_number, sum_of
 
-# Definitions kept as names, so that a chain of them is not expanded: symbols with a meaning, and their rates.
+# Definitions as symbols with a meaning, so that a chain of them is not expanded, and their rates.
 
 
 class Defined(sympy.Dummy):  # type: ignore[misc]
-    """A symbol that stands for a formula, of which it depends on the symbols.  meaning: that formula."""
+    """A symbol that stands for a formula and depends on its symbols.  meaning: that formula."""
 
     meaning: sympy.Expr
 
     def __new__(cls, name: str, meaning: sympy.Expr) -> Defined:
-        """A new symbol, equal to no other."""
+        """A new symbol, different from all others."""
         symbol: Defined = sympy.Dummy.__new__(cls, name, real=True)
         symbol.meaning = meaning
         symbol._inner = frozenset(meaning.free_symbols)
@@ -28,7 +28,7 @@ class Defined(sympy.Dummy):  # type: ignore[misc]
 
     @property
     def free_symbols(self) -> set[sympy.Basic]:
-        """Itself, and what its formula holds."""
+        """Itself and the symbols of its formula."""
         return {self, *self._inner}
 
     def _sympystr(self, _printer: Any) -> str:
@@ -36,7 +36,7 @@ class Defined(sympy.Dummy):  # type: ignore[misc]
 
 
 def rate_along(rates: Mapping[sympy.Symbol, sympy.Expr]) -> Callable[[sympy.Expr], sympy.Expr]:
-    """The derivative along a motion, given the rates of the variables; a definition has a rate that is defined too."""
+    """The derivative along a motion with these rates of the variables; the rate of a definition is a definition."""
     known: dict[Defined, sympy.Expr] = {}
 
     def rate(value: sympy.Expr) -> sympy.Expr:
@@ -57,30 +57,39 @@ def rate_along(rates: Mapping[sympy.Symbol, sympy.Expr]) -> Callable[[sympy.Expr
 
 def rationals(values: Mapping[sympy.Symbol, Fraction]) -> dict[sympy.Symbol, sympy.Rational]:
     """Exact values for SymPy."""
-    return {symbol: sympy.Rational(value.numerator, value.denominator) for symbol, value in values.items()}
+    return {symbol: sympy.Rational(value) for symbol, value in values.items()}
+
+
+def rational_values(
+    expressions: Iterable[sympy.Expr], sample: Mapping[sympy.Symbol, Fraction]
+) -> list[Fraction] | None:
+    """The values of expressions at a sample; None where one of them is no rational number."""
+    numbers = rationals(sample)
+    values = [e.xreplace(numbers) for e in expressions]
+    return list(map(Fraction, values)) if all(value.is_Rational for value in values) else None
 
 
 def at_values(expression: sympy.Expr, values: Mapping[sympy.Symbol, sympy.Expr]) -> sympy.Expr:
-    """The expression with these values, inside of definitions too."""
+    """The expression with these values, in definitions too."""
     known: dict[Defined, sympy.Expr] = {}
 
-    def put_in(e: sympy.Expr) -> sympy.Expr:
+    def substituted(e: sympy.Expr) -> sympy.Expr:
         for symbol in e.atoms(Defined):
             if symbol not in known:
-                known[symbol] = put_in(symbol.meaning)
+                known[symbol] = substituted(symbol.meaning)
         e = e.xreplace(known)
         return e.subs(values, simultaneous=True) if e.free_symbols else e
 
-    return put_in(expression)
+    return substituted(expression)
 
 
 _BOUNDS = dict.fromkeys(("sin", "cos", "tanh", "sech", "sn", "cn"), Fraction(1)) | {"atan": Fraction(11, 7)}
 
 
 def sign_of(e: sympy.Expr) -> Sign:
-    """Its sign wherever it is defined and real, from positive symbols, squares, roots, exponentials."""
+    """The sign of an expression where it is defined and real, from positive symbols, squares, roots, exponentials."""
     if e.is_Rational:
-        return Sign(1 if e >= 0 else -1, bool(e != 0))
+        return sign_of_number(e) if e else Sign(1, False)
     if e.is_Symbol or e.is_NumberSymbol:
         return PLUS if e.is_positive else UNKNOWN
     if e.is_Mul:
@@ -110,27 +119,27 @@ def _sign_of_power(base: sympy.Expr, exponent: sympy.Expr) -> Sign:
 
 
 def _sign_of_sum(e: sympy.Expr) -> Sign:
-    """The sign of a sum with parts of one sign; bounded functions count against the constant part."""
+    """The sign of a sum with parts of one sign; bounds of bounded functions are subtracted from the constant part."""
     constant, signs = Fraction(0), []
     for part in e.args:
-        coefficient, rest = part.as_coeff_Mul()
-        size = abs(Fraction(int(coefficient.p), int(coefficient.q))) if coefficient.is_Rational else None
+        coefficient, factor = part.as_coeff_Mul()
+        bound = _BOUNDS.get(type(factor).__name__)
         if part.is_Rational:
-            constant += Fraction(int(part.p), int(part.q))
-        elif size is not None and type(rest).__name__ in _BOUNDS and sign_of(part).value <= 0:
-            constant -= size * _BOUNDS[type(rest).__name__]
+            constant += Fraction(part)
+        elif coefficient.is_Rational and bound is not None and sign_of(part).value <= 0:
+            constant -= abs(Fraction(coefficient)) * bound
         else:
             signs.append(sign_of(part))
     if constant:
-        signs.append(Sign(1 if constant > 0 else -1, True))
+        signs.append(sign_of_number(constant))
     elif not signs:
         return UNKNOWN
-    # a constant part below 0 is a bound from below, and tells nothing
+    # a negative constant part is only a lower bound
     return sum_of(signs) if constant >= 0 else UNKNOWN
 
 
 class Names:
-    """Symbols for the polynomials of the state that are constant in time, the smallest first."""
+    """Symbols for the smallest polynomials of the state that are constant in time."""
 
     def __init__(self, state: frozenset[sympy.Symbol], is_constant: Callable[[sympy.Expr], bool]) -> None:
         self._state = state
@@ -139,7 +148,7 @@ class Names:
 
     @property
     def meanings(self) -> dict[sympy.Symbol, sympy.Expr]:
-        """The symbols given so far, with their meanings."""
+        """The symbols so far, with their meanings."""
         return {name: e for e, name in self._names.items() if name is not None}
 
     def put_into(self, e: sympy.Expr) -> sympy.Expr:
@@ -163,15 +172,15 @@ class Names:
 
     def _into_sum(self, e: sympy.Expr) -> sympy.Expr:
         parts = {part: self.put_into(part) for part in e.args}
-        left = [part for part, named in parts.items() if named.free_symbols & self._state]
-        done = [named for part, named in parts.items() if part not in left]
-        moving = sympy.Add(*left)
-        name = self._name(moving) if left else moving
-        return sympy.Add(*done, name) if name != moving else sympy.Add(*parts.values())
+        moving = [part for part, named in parts.items() if named.free_symbols & self._state]
+        constant = [named for part, named in parts.items() if part not in moving]
+        total = sympy.Add(*moving)
+        name = self._name(total) if moving else total
+        return sympy.Add(*constant, name) if name != total else sympy.Add(*parts.values())
 
     def _name(self, e: sympy.Expr) -> sympy.Expr:
         if e not in self._names:
             constant = e.is_polynomial(*self._state) and self._is_constant(e)
-            # no name of a file has brackets
+            # names in files have no parentheses
             self._names[e] = sympy.Symbol(f"({e})", real=True) if constant else None
         return self._names[e] or e

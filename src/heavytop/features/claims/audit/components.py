@@ -1,8 +1,8 @@
-"""One component of a motion as a function of time, its reduced equation, and the angles by their rates.
+"""Claims of one component of a motion as a function of time, of its reduced equation, and of angles by their rates.
 
-A component u of the state obeys u'² = f(u) where first integrals have the values of a start.  Proven are, where they
-have these values, that equation and u'' = f'(u)/2 from the equations of motion; then the same two of the function of
-time, and that it begins with the u and u' of the start: the second has one solution alone, and that is it.  A
+A component u of the state obeys u'² = f(u) where first integrals have the values of a start.  On these values that
+equation and u'' = f'(u)/2 are proven from the equations of motion.  Then the same two equations are proven of the
+function of time, and that it begins with the u and u' of the start: the second equation has only one such solution.  A
 quadrature t = ∫ du/√f(u) and the rates of angles are statements on the state; angles are judged by their rates.
 """
 
@@ -21,13 +21,14 @@ from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.rational import forces_zero
 from heavytop.features.claims.algebra.reader import Formula, parse, symbol
 from heavytop.features.claims.algebra.statement import ALL, TIME, Flow, Formulas, Point, Setting, Statement
-from heavytop.features.claims.algebra.structure import at_values, rate_along, rationals
+from heavytop.features.claims.algebra.structure import at_values, rate_along, rational_values
 from heavytop.features.claims.audit.context import (
     DOMAINS,
     STATE,
     ClaimFile,
     ComponentTable,
     IntegralTable,
+    QuadratureTable,
     needs_of,
     setting_of,
     three,
@@ -45,7 +46,7 @@ _ANGLES = ("phi", "theta", "psi")
 
 
 def _rate_of_angle(name: str, omega: tuple[sympy.Expr, ...]) -> tuple[sympy.Expr, sympy.Expr]:
-    """(a, b): the rate of an angle of (3.2) is a/b, where b is 0 at the poles alone."""
+    """(a, b): the rate of an angle of (3.2) is a/b, where b is 0 only at the poles."""
     level = omega[0] * _GAMMA[0] + omega[1] * _GAMMA[1]
     if name == "psi":
         return level, _ACROSS
@@ -55,7 +56,7 @@ def _rate_of_angle(name: str, omega: tuple[sympy.Expr, ...]) -> tuple[sympy.Expr
 
 
 class UserComponent(UserIntegral):
-    """A component claimed in a file: its statements on the state are those of relations, the values of the start."""
+    """A component claimed in a file; its statements on the state are on the relations with the values of the start."""
 
     @property
     def variables(self) -> tuple[sympy.Symbol, ...]:
@@ -96,26 +97,24 @@ class UserComponent(UserIntegral):
             raise InputError("[component] gives a value and no reduced equation u'^2 = f(u).", remedy)
 
     def _levels(self) -> Iterator[Formula]:
-        """First integrals less their values at the start."""
+        """First integrals minus their values at the start."""
         if not self.start:
             return
         p = self.context.parameters(self.about(None))
         standard = [energy(p, STATE), area(p, STATE)]
-        own = [parse(text, self.context.names, "component.constants") for text in self._component.constants]
-        for formula in (*map(symbol, standard), *own):
+        constants = [parse(text, self.context.names, "component.constants") for text in self._component.constants]
+        for formula in (*map(symbol, standard), *constants):
             yield replace(formula, expression=formula.expression - self._at_start(formula.expression))
 
     def _at_start(self, e: sympy.Expr) -> sympy.Expr:
         return e.xreplace({x: part.expression for x, part in zip(STATE, self.start, strict=True)})
 
     def _states(self, conditions: Sequence[sympy.Expr], parameters: Mapping[sympy.Symbol, Fraction]) -> list[Point]:
-        """The start where it is rational at these parameters; states on the conditions where none is given."""
+        """The start where it is rational at these parameters; without a start states on the conditions."""
         if not self.start:
             return super()._states(conditions, parameters)
-        numbers = rationals(parameters)
-        values = [part.expression.xreplace(numbers) for part in self.start]
-        exact = [Fraction(int(value.p), int(value.q)) for value in values if value.is_Rational]
-        return [dict(zip(STATE, exact, strict=True))] if len(exact) == len(values) else []
+        values = rational_values((part.expression for part in self.start), parameters)
+        return [] if values is None else [dict(zip(STATE, values, strict=True))]
 
     @cached_property
     def _square(self) -> Formula | None:
@@ -131,12 +130,13 @@ class UserComponent(UserIntegral):
             if table.time is None
             else rate_along({self._u: sympy.Integer(1)})(quadrature.expression)
         )
-        # the equation without roots says as much where the integrand is real
+        # the equation without roots is equivalent where the integrand is real
         return replace(quadrature, expression=1 / slope**2, needs=_without(quadrature.needs, self._u))
 
-    def _of(self, name: str, table: object, extra: bool) -> Formula | None:
+    def _of(self, name: str, table: QuadratureTable | ComponentTable | None) -> Formula | None:
+        """A formula of a table, which may contain t in [component]; None where absent."""
         text = getattr(table, name, None)
-        names = self.context.names | ({"t": symbol(TIME)} if extra else {})
+        names = self.context.names | ({"t": symbol(TIME)} if table is self._component else {})
         return None if text is None else parse(text, names, f"{name} of the claim")
 
     # --- on the state -------------------------------------------------------------------------------------------------
@@ -180,7 +180,7 @@ class UserComponent(UserIntegral):
             claims.append(("reduced", 1, f, slope**2, one, "u'^2 = f(u)", needs))
             claims.append(("reduced", 2, sympy.diff(f, u) / 2, rate(slope), one, "u'' = f'(u)/2", needs))
         for index, name in enumerate(_ANGLES, 1):
-            claimed = self._of(name, self.content.quadrature, False)
+            claimed = self._of(name, self.content.quadrature)
             if claimed is not None:
                 above, below = _rate_of_angle(name, omega)
                 text = f"{name}' of the angles"
@@ -192,12 +192,12 @@ class UserComponent(UserIntegral):
         for equation, index, claimed, above, below, text, needs in claims:
             pole = _POLE if equation == "rate" else ""
             of_u = claimed.xreplace(known)
-            held = None if of_u.free_symbols & frozenset(STATE) else _through(u, q.expression, zeros, (above, below))
-            put = known if held else {u: q.expression}
-            needs = frozenset(_off_pole(need, u if held else None) for need in _put(needs, put))
-            if held is not None and all(sympy.expand(e) == 0 for _, e in kept):
-                residual = sympy.numer(sympy.together(of_u * held[1] - held[0]))
-                formulas = Formulas((u,), _without(base, *STATE) | needs | condition("/", (held[2],)), pole=pole)
+            through = None if of_u.free_symbols & frozenset(STATE) else _through(u, q.expression, zeros, (above, below))
+            put = known if through else {u: q.expression}
+            needs = frozenset(_off_pole(need, u if through else None) for need in _put(needs, put))
+            if through is not None and all(sympy.expand(e) == 0 for _, e in kept):
+                residual = sympy.numer(sympy.together(of_u * through[1] - through[0]))
+                formulas = Formulas((u,), _without(base, *STATE) | needs | condition("/", (through[2],)), pole=pole)
                 in_u.append(Statement(equation, index, "smooth", ALL, residual, text, formulas))
             elif index == 1 or equation == "rate":
                 residual = sympy.numer(sympy.together(claimed.xreplace({u: q.expression}) * below - above))
@@ -207,7 +207,7 @@ class UserComponent(UserIntegral):
         return in_u, on_state
 
     def _known_components(self) -> dict[sympy.Expr, sympy.Expr]:
-        """Components of the state by u and by the values of first integrals that are components themselves."""
+        """Components of the state in terms of u and of constants, where first integrals are components."""
         values = {
             x: x - part.expression for part in self.where for x in part.expression.free_symbols & frozenset(STATE)
         }
@@ -219,17 +219,17 @@ class UserComponent(UserIntegral):
         """The rate of an angle as a function of u, where the first integrals have their values."""
         omega = tuple(system.angular_velocity(self.context.parameters(system), STATE))
         zeros = [*(part.expression for part in self.where), OFF_SPHERE]
-        held = _through(self._u, self.quantity.expression, zeros, _rate_of_angle(name, omega))
-        if held is None:
+        through = _through(self._u, self.quantity.expression, zeros, _rate_of_angle(name, omega))
+        if through is None:
             raise InputError(f"The rate of {name} is no function of {self._u}.", f"Give {name} by its rate alone.")
-        needs = condition("/", (held[1],)) | condition("/", (held[2],))
-        return replace(symbol(held[0] / held[1]), needs=needs)
+        needs = condition("/", (through[1],)) | condition("/", (through[2],))
+        return replace(symbol(through[0] / through[1]), needs=needs)
 
     # --- in time ------------------------------------------------------------------------------------------------------
 
     def _in_time(self, system: System) -> list[Statement]:
         """The two equations of the function of time, its start, and the rates of the angles along it."""
-        value = self._of("value", self._component, True)
+        value = self._of("value", self._component)
         if value is None or self._square is None:
             return []
         c, u, f = value.expression, self._u, self._square.expression
@@ -252,7 +252,7 @@ class UserComponent(UserIntegral):
             equations.append(made("start", component, residual, f"u{chr(39) * (component - 1)} at t = 0", at_zero))
         equations.append(made("start", 3, self._at_start(OFF_SPHERE), "|gamma|^2 = 1 at t = 0", at_zero))
         for index, name in enumerate(_ANGLES, 1):
-            angle, claimed = self._of(name, self._component, True), self._of(name, self.content.quadrature, False)
+            angle, claimed = self._of(name, self._component), self._of(name, self.content.quadrature)
             if angle is not None:
                 if claimed is None or claimed.expression.free_symbols & frozenset(STATE):
                     claimed = self._true_rate(name, system)
@@ -269,42 +269,41 @@ def _put(needs: frozenset[Need], values: Mapping[sympy.Expr, sympy.Expr]) -> fro
 
 
 def _off_pole(need: Need, u: sympy.Symbol | None) -> Need:
-    """The remainder of it where γ is not vertical in the body; u: γ3 in it, where it is one."""
+    """The remaining need where γ is not vertical in the body; u: the symbol of γ3 in it, if any."""
     across = _ACROSS if u is None else 1 - u**2
     ratio = sympy.cancel(need.expression.subs(_GAMMA[2] ** 2, 1 - _ACROSS) / across)
-    ours = need.kind is ConditionKind.NONZERO and not ratio.free_symbols & frozenset((*STATE, u))
-    return Need(need.kind, ratio) if ours else need
+    is_constant = not ratio.free_symbols & frozenset((*STATE, u))
+    return Need(need.kind, ratio) if is_constant and need.kind is ConditionKind.NONZERO else need
 
 
 def _without(needs: frozenset[Need], *symbols: sympy.Symbol) -> frozenset[Need]:
-    """Those that are about none of the symbols."""
+    """The needs without these symbols."""
     return frozenset(need for need in needs if not need.expression.free_symbols & frozenset(symbols))
 
 
 def _through(
     u: sympy.Symbol, q: sympy.Expr, zeros: Sequence[sympy.Expr], parts: Sequence[sympy.Expr]
 ) -> tuple[sympy.Expr, sympy.Expr, sympy.Expr] | None:
-    """Polynomials of the state as functions of u = q where ``zeros`` are 0, and what must not be 0 for that.
+    """Polynomials of the state as functions of u = q where ``zeros`` are 0, and a divisor that must not be 0.
 
-    Coefficients are symbols of their own: what is found by a Gröbner basis over their fractions is proven without any,
-    as a combination of the zeros.  None where they are no functions of u.
+    A Gröbner basis over fractions of the coefficients proposes the functions; they are proven as combinations of the
+    zeros.  None where the polynomials are no functions of u.
     """
     if not all(e.is_polynomial(*STATE) for e in (q, *zeros, *parts)):
         return None
-    held = {z: z.free_symbols & frozenset(STATE) for z in zeros}
-    near = set().union(*(e.free_symbols for e in (q, *parts)), *(x for x in held.values() if len(x) == 1))
-    zeros = [z for z in zeros if held[z]]
-    close = [z for z in zeros if held[z] <= near]
-    audits = (
-        _through_zeros(u, q, chosen, parts) for chosen in ((close, zeros) if len(close) < len(zeros) else (zeros,))
-    )
-    return next((audit for audit in audits if audit is not None), None)
+    variables = {z: z.free_symbols & frozenset(STATE) for z in zeros}
+    near = set().union(*(e.free_symbols for e in (q, *parts)), *(x for x in variables.values() if len(x) == 1))
+    zeros = [z for z in zeros if variables[z]]
+    close = [z for z in zeros if variables[z] <= near]
+    chosen = (close, zeros) if len(close) < len(zeros) else (zeros,)
+    results = (_through_zeros(u, q, choice, parts) for choice in chosen)
+    return next((result for result in results if result is not None), None)
 
 
 def _through_zeros(
     u: sympy.Symbol, q: sympy.Expr, zeros: Sequence[sympy.Expr], parts: Sequence[sympy.Expr]
 ) -> tuple[sympy.Expr, sympy.Expr, sympy.Expr] | None:
-    """Result of :func:`_through` by these zeros alone."""
+    """The result of :func:`_through` with these zeros alone."""
     names: dict[sympy.Expr, sympy.Symbol] = {}
 
     def named(e: sympy.Expr, monic: bool) -> sympy.Expr:
@@ -318,14 +317,14 @@ def _through_zeros(
         return total
 
     relations = [named(e, True) for e in (*zeros, u - q)]
-    wanted = [named(e, False) for e in parts]
+    targets = [named(e, False) for e in parts]
     order = (*(x for x in STATE if x != q), *(x for x in STATE if x == q), u)
     basis = sympy.groebner(
         relations, *order, order="lex", domain=sympy.QQ.frac_field(*names.values()) if names else sympy.QQ
     )
     meanings = {name: value for value, name in names.items()}
-    divisor, audits = sympy.Integer(1), []
-    for e in wanted:
+    divisor, functions = sympy.Integer(1), []
+    for e in targets:
         above, below = sympy.fraction(sympy.together(basis.reduce(e)[1]))
         if above.free_symbols & frozenset(STATE):
             return None
@@ -334,7 +333,7 @@ def _through_zeros(
         if not forces_zero(numerators, field_.enter(below * e - above).numerator, radical=False):
             return None
         divisor *= below.xreplace(meanings)
-        audits.append((above / below).xreplace(meanings))
+        functions.append((above / below).xreplace(meanings))
     for z in (*zeros, u - q):
         divisor *= sympy.Poly(z, *STATE, u).LC()
-    return audits[0], audits[1], divisor
+    return functions[0], functions[1], divisor

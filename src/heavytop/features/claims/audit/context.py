@@ -1,4 +1,4 @@
-"""The context of every kind of claim in a file: its names, assumptions and samples, and the top that it is about."""
+"""The common part of claims in files: tables, names, assumptions, samples, the top, and the clock of a motion."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ from heavytop.features.claims.library.entry import Entry
 from heavytop.precision import exact
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, Parameters, System, system
 
-# What a claim in TOML may hold: a motion, a first integral or an invariant relation, as it is written.
+# The tables of a claim in TOML: a motion, a component of one, a first integral or an invariant relation.
 
 
 Text = Annotated[str, msgspec.Meta(max_length=20_000)]
@@ -83,9 +83,9 @@ class ClaimedMotionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True
 
 
 class QuadratureTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """[quadrature]: the formulas of [motion] hold u, and t = F(u) + constant where u is between bounds.
+    """[quadrature]: the formulas of [motion] contain u, and t = F(u) + constant where u is between bounds.
 
-    time: F(u); or integrand: F'(u).  where: comparisons that bound u.  points: values of u to look for a witness at.
+    time: F(u); or integrand: F'(u).  where: comparisons that bound u.  points: values of u for a witness.
     phi, theta, psi: of a component, rates of the angles in the state and u.
     """
 
@@ -100,9 +100,9 @@ class QuadratureTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class IntegralTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """[integral]: F(Ω, γ), where it is claimed to be constant, and exact states to look for a witness at.
+    """[integral]: F(Ω, γ), where it is claimed to be constant, and exact states for a witness.
 
-    Without states the audit takes some of its own, on the conditions where it finds such.
+    Without states the audit uses states of its own, on the conditions where it finds such.
     """
 
     value: Text
@@ -117,10 +117,10 @@ class IntegralTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ComponentTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """[component]: a quantity of the state, u, which is claimed to be a function of t, and angles beside it.
+    """[component]: a quantity u of the state and angles, claimed as functions of t.
 
-    reduced: f(u), the square of its rate.  constants: first integrals that have the value of the start, beside energy
-    and area.  where: formulas that are 0 at every state the claim is about.
+    reduced: f(u), the square of its rate.  constants: first integrals with the value of the start, besides energy and
+    area.  where: formulas that are 0 at every state of the claim.
     """
 
     quantity: Text
@@ -134,10 +134,7 @@ class ComponentTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ClaimFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The whole file.
-
-    entry: what it says as an entry of the library, where it is one.
-    """
+    """The file; entry: its keys as an entry of the library, where it is one."""
 
     name: Annotated[str, msgspec.Meta(max_length=80)]
     kind: str
@@ -160,7 +157,7 @@ class ClaimFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def sample_rows(parameters: Mapping[str, Sequence[str] | str]) -> list[dict[str, str]]:
-    """The sample values of the parameters, one dict a sample; a single value serves all samples.
+    """The values of the parameters, one dict per sample; a single value is that of all samples.
 
     Raises InputError where the lists differ in length.
     """
@@ -174,16 +171,16 @@ def sample_rows(parameters: Mapping[str, Sequence[str] | str]) -> list[dict[str,
     ]
 
 
-# The tensor of inertia of a claim: three principal moments, or six or nine entries in other axes.
+# The inertia of a claim: three principal moments, or six or nine entries of the tensor in other axes.
 
 
 _ORDER = (0, 3, 4, 3, 1, 5, 4, 5, 2)
-"""Position of each entry, row by row, among I11, I22, I33, I12, I13, I23."""
+"""Indices of the nine entries, row by row, among I11, I22, I33, I12, I13, I23."""
 _REMEDY = "Give 3 principal moments, 6 entries I11, I22, I33, I12, I13, I23 of the tensor, or 9, row by row."
 
 
 def read_tensor(inertia: Sequence[str | list[str]]) -> tuple[str, ...]:
-    """The entries of ``inertia`` as they are written, three, or nine row by row.
+    """The texts of ``inertia``: three moments, or nine entries row by row.
 
     Raises InputError unless they are 3, 6 or 9, or 3 rows of 3.
     """
@@ -206,7 +203,6 @@ def tensor_of(entries: Sequence[sympy.Expr], texts: Sequence[str]) -> tuple[symp
         if sympy.expand(rows[i][j] - rows[j][i]) != 0:
             pair = f"I{i + 1}{j + 1} = {texts[3 * i + j]}, I{j + 1}{i + 1} = {texts[3 * j + i]}"
             raise InputError(f"The tensor of inertia is not symmetric: {pair}.", _REMEDY)
-    # off the diagonal 0: the axes are principal
     is_diagonal = all(rows[i][j] == 0 for i, j in combinations(range(3), 2))
     return (rows[0][0], rows[1][1], rows[2][2]) if is_diagonal else rows
 
@@ -225,17 +221,17 @@ def _principal_minors(matrix: sympy.Matrix) -> tuple[sympy.Expr, ...]:
 
 STATE = sympy.symbols("Omega1:4 gamma1:4", real=True)
 RESERVED = {"t", "pi", *(FUNCTION_NAMES.keys() - FORMULAS.keys()), *(str(variable) for variable in STATE)}
-"""Names that no parameter may have: an elliptic function is one only before a parenthesis."""
+"""Names that no parameter may have; names of elliptic functions are free, since these precede a parenthesis."""
 _SAMPLE_BITS = 512
 _MOST_BITS = 6_640
-"""Bits of numerator and denominator of a number in a sample: 2000 digits."""
+"""The most bits of numerator and denominator of a number in a sample: 2000 digits."""
 _OF_THE_TOP = "The moments, the weight, the centre of mass and k of a top are constant: use numbers and parameters."
 _OF_PARAMETERS = "Relations are between parameters; conditions on the state stand in where of [integral]."
 
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """The context of a claim: names, assumptions, samples, and the top they are about.
+    """The context of a claim: names, assumptions, samples, and the top.
 
     rotor: λ of a gyrostat, with what it needs.  carried: k of a heavy gyrostat.
     """
@@ -252,7 +248,7 @@ class Context:
     carried: tuple[sympy.Expr, ...] | None = None
 
     def with_rotor(self, rotor: sympy.Expr | None, is_constant: bool) -> Context:
-        """The context with the rotor in this form; raises InputError unless it is shown to be constant in time."""
+        """The context with a simplified rotor; raises InputError unless it is shown to be constant in time."""
         if not is_constant:
             text = quoted(str(self.rotor))[1:-1]
             raise InputError(
@@ -263,14 +259,14 @@ class Context:
 
     @property
     def systems(self) -> tuple[System, ...]:
-        """The systems that the claim says something about."""
+        """The systems that the claim may be about."""
         if self.carried is not None:
             return (HEAVY_GYROSTAT,)
         turns_about_two = self.rotor is not None and not isinstance(self.top.inertia[0], tuple)
         return tuple(system for system in SYSTEMS if system is not GYROSTAT or turns_about_two)
 
     def parameters(self, system: System) -> Parameters:
-        """Parameters of the field; raises InputError where the file lacks the rotor of the system."""
+        """The parameters of the field; raises InputError where the file lacks the rotor of the system."""
         if (system is HEAVY_GYROSTAT) is not (self.carried is not None):
             raise _other_rotor(system)
         if self.carried is not None:
@@ -284,7 +280,6 @@ class Context:
 
 
 def _other_rotor(system: System) -> InputError:
-    """The error where one of the two has a rotor of three components, and the other lacks it."""
     if system is HEAVY_GYROSTAT:
         cause = "The file gives no rotor of three components, so it says nothing about heavy_gyrostat."
         return InputError(cause, "Add rotor = [k1, k2, k3] to [top].")
@@ -293,7 +288,7 @@ def _other_rotor(system: System) -> InputError:
 
 
 def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Context:
-    """Parsed parameters, assumptions, definitions and top; raises InputError for what cannot be understood."""
+    """Parsed parameters, assumptions, definitions and top; raises InputError for an invalid one."""
     variables = tuple(variables)
     reserved = RESERVED.union(map(str, variables))
     for name in (*content.parameters, *content.definitions):
@@ -304,7 +299,7 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     texts = list(assumptions(content.assume))
     tensor = read_tensor(content.top.inertia)
     diagonal = tensor if len(tensor) == 3 else tensor[::4]
-    # the moments of inertia of a top are positive, said or not
+    # the moments of inertia of a top are positive, assumed or not
     positive = {left for left, right, kind in texts if right == "0" and kind is ConditionKind.POSITIVE}
     positive |= {text.strip() for text in diagonal}
     symbols = {
@@ -374,7 +369,7 @@ def three(texts: Iterable[str], names: dict[str, Formula], where: str) -> tuple[
 
 
 def _check_constant(where: str, formulas: Sequence[Formula], remedy: str, variables: Iterable[sympy.Symbol]) -> None:
-    """Raises InputError where a formula, or what it needs, depends on what moves, directly or not."""
+    """Raises InputError where a formula or one of its needs depends on a symbol that moves."""
     for formula in formulas:
         free = formula.expression.free_symbols.union(*(need.expression.free_symbols for need in formula.needs))
         moving = sorted(map(str, free & {TIME, *STATE, *variables}))
@@ -384,7 +379,7 @@ def _check_constant(where: str, formulas: Sequence[Formula], remedy: str, variab
 
 
 def _check_samples(context: Context, compared: Sequence[Comparison]) -> None:
-    """Samples that break the claim's own assumptions would be false witnesses: raises InputError."""
+    """Raises InputError for a sample that breaks the claim's own assumptions: it would be a false witness."""
     for sample in context.samples:
         values = ", ".join(f"{name} = {value}" for name, value in sample.items())
         broken = next(_broken(context, sample, compared), None)
@@ -399,11 +394,11 @@ def _check_samples(context: Context, compared: Sequence[Comparison]) -> None:
                 number = written(str(at_sample)) if at_sample.is_Rational else ball.str(6, radius=False)
                 got = f"; it is {number} at the sample {values}" if moment.free_symbols else ""
                 cause = f"{name} {written(str(moment))} of top.inertia must be positive{got}."
-                raise InputError(cause, _cure(context, moment, compared))
+                raise InputError(cause, _remedy_for_moment(context, moment, compared))
 
 
-def _cure(context: Context, moment: sympy.Expr, compared: Sequence[Comparison]) -> str:
-    """The remedy for a moment that is not positive: no sample is one where no parameters make it so."""
+def _remedy_for_moment(context: Context, moment: sympy.Expr, compared: Sequence[Comparison]) -> str:
+    """The remedy for a moment that is not positive: another sample, or another formula where no sample helps."""
     others = [other for other in minors(context.top.inertia) if other != moment]
     for facts in ((), others):
         assumed = assume(compared, (), facts, context.symbols.values())
@@ -426,14 +421,14 @@ def _broken(context: Context, sample: dict[sympy.Symbol, Fraction], compared: Se
 
 
 def _at_equality(context: Context, compared: Sequence[Comparison]) -> Iterator[dict[sympy.Symbol, Fraction]]:
-    """Samples at which an assumption that allows equality has it, where a parameter stands alone on one side."""
+    """Samples at which both sides of a weak assumption are equal, where one side is a parameter."""
     for *pair, kind in compared:
         for parameter, other in (pair, pair[::-1]) if kind is ConditionKind.NONNEGATIVE else ():
             for sample in context.samples if parameter.is_Symbol else ():
                 value = other.subs(rationals(sample))
                 if not value.is_Rational:
                     continue
-                at_end = {**sample, parameter: Fraction(int(value.p), int(value.q))}
+                at_end = {**sample, parameter: Fraction(value)}
                 moments = (_at(moment, at_end) for moment in minors(context.top.inertia))
                 if all(m > 0 for m in moments) and not any(_broken(context, at_end, compared)):
                     yield at_end
@@ -466,11 +461,11 @@ def setting_of(context: Context, variable: sympy.Symbol) -> Setting:
 
 
 def _body_needs(inertia: Sequence[sympy.Expr]) -> tuple[Need, ...]:
-    """No principal moment of a rigid body exceeds the sum of the other two; of a tensor ∫ x xᵀ dm = ½ tr I − I is
-    positive semidefinite: its principal minors are >= 0.  () for numbers.
+    """The needs of a rigid body: no principal moment exceeds the sum of the other two.
 
-    A claim about one top is judged about that top, as the equations do not mind; one about many is not refuted by a
-    top that no body is.
+    For a tensor ∫ x xᵀ dm = ½ tr I − I is positive semidefinite: its principal minors are >= 0.
+    () for numbers: a claim about one top is judged for that top, and a claim about many is not refuted by a top that
+    no body has.
     """
     matrix = sympy.Matrix(inertia)
     if not matrix.free_symbols:
@@ -481,14 +476,13 @@ def _body_needs(inertia: Sequence[sympy.Expr]) -> tuple[Need, ...]:
     return tuple(Need(ConditionKind.NONNEGATIVE, minor) for minor in minors if minor.free_symbols)
 
 
-def of_file(asked: System | None, written: str | None, usual: System) -> System:
-    """The system asked for, else the one written in a file, else the usual; raises InputError where two differ."""
-    own = None if written is None else system(written)
-    if asked is not None and own is not None and asked is not own:
-        raise InputError(
-            f"The file is about {own.name}, but {asked.name} was asked for.", "Ask for that of the file, or none."
-        )
-    return asked or own or usual
+def of_file(requested: System | None, written: str | None, default: System) -> System:
+    """The system requested, else the one written in a file, else the default; raises InputError where two differ."""
+    of_claim = None if written is None else system(written)
+    if requested is not None and of_claim is not None and requested is not of_claim:
+        cause = f"The file is about {of_claim.name}, but {requested.name} was asked for."
+        raise InputError(cause, "Ask for that of the file, or none.")
+    return requested or of_claim or default
 
 
 # The clock of a claimed motion: the time itself, or a quadrature t = F(u) + constant that is not inverted.
@@ -505,10 +499,10 @@ _BEYOND = (Fraction(1, 7), Fraction(3, 2))
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """The variable that the formulas of a motion hold, and its rate.
+    """The variable in the formulas of a motion, and the derivative in time.
 
-    variable: t or u.  rate: the derivative in time.  values: F' and 1/F', both of which have to be continuous; none
-    where t itself is the variable.  needs: for these, and for the bounds of u, to be defined.
+    variable: t or u.  values: F' and 1/F', which have to be continuous; none where t itself is the variable.
+    needs: of these, and of the bounds of u.
     """
 
     variable: sympy.Symbol
@@ -519,7 +513,7 @@ class Clock:
 
 
 def variable_of(content: ClaimFile) -> sympy.Symbol:
-    """The symbol that the formulas of a motion hold: t, or the variable of its quadrature.
+    """The variable in the formulas of a motion: t, or that of its quadrature.
 
     Raises InputError where that name is taken.
     """
@@ -533,7 +527,7 @@ def variable_of(content: ClaimFile) -> sympy.Symbol:
 
 
 def read_clock(content: ClaimFile, context: Context) -> Clock:
-    """The clock of a motion claimed in a file; raises InputError for a quadrature that cannot be understood."""
+    """The clock of a motion claimed in a file; raises InputError for an invalid quadrature."""
     table, u = content.quadrature, variable_of(content)
     if table is None:
         return Clock(TIME, rate_along({TIME: sympy.Integer(1)}), DOMAINS[content.domain])
@@ -565,7 +559,7 @@ def _points(
     facts: Sequence[sympy.Expr],
     samples: Sequence[Mapping[sympy.Symbol, Fraction]],
 ) -> tuple[Fraction, ...]:
-    """The points of the file, else some between and beyond the bounds at the samples, on the domain or not."""
+    """The points of the file, else points between and beyond the bounds at the samples."""
     if table.points is not None:
         return tuple(sample_number(point, "quadrature.points") for point in table.points)
     points = list(_POINTS)
@@ -581,6 +575,5 @@ def _end(fact: sympy.Expr, u: sympy.Symbol, sample: Mapping[sympy.Symbol, Fracti
     slope = sympy.diff(fact, u)
     if u in slope.free_symbols or slope == 0:
         return None
-    value = (u - fact / slope).subs(rationals(sample))
-    value = sympy.expand(value)
-    return Fraction(int(value.p), int(value.q)) if value.is_Rational else None
+    value = sympy.expand((u - fact / slope).subs(rationals(sample)))
+    return Fraction(value) if value.is_Rational else None

@@ -1,8 +1,8 @@
-"""A claim substituted into every equation: a verdict for each, with a proof or a witness.
+"""Verdicts on the statements of a claim, each with a proof or a witness.
 
 ``holds`` is an identity proven by exact algebra with every condition of the proof discharged; ``refuted`` is a
 witness: exact parameters and a time in the domain, on all relations, where every formula is defined and real and a
-ball excludes 0; anything else is ``undecided`` with a bound at the sample points.  Balls alone never prove.
+ball excludes 0; other statements are ``undecided``, with a bound at the sample points.  Balls alone prove nothing.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ ABOUT = {
     "stability": "the stability of a steady motion",
     "value": "numbers of a motion",
 }
-"""The subject of the formulas of each kind of claim."""
+"""The subject of each kind of claim."""
 _BITS = (192, 1024)
 _MOST_BITS = 300_000
-"""Bits of the exponent of a residual that is written as exact text: those of decimal text go up to 10^100000."""
+"""The largest exponent of 2 of a residual written as exact text: that of decimal text ends at 10^100000."""
 _LONGEST = 160
 
 
@@ -50,9 +50,9 @@ class StatementVerdict:
     """The verdict on one statement.
 
     holds: True (proven), False (refuted by ``witness``), None (undecided).
-    residual: "0", the closed form where found, else what the balls say.
-    conditions: what the proof rests on; the row is undecided if one is not discharged.
-    figures: of a published number, what is printed, its digits that are right, the proven value.
+    residual: "0", a closed form, or a bound by balls.
+    conditions: of the proof; the row is undecided if one is not discharged.
+    figures: of a published number, the printed text, the number of its correct digits, the proven value.
     """
 
     equation: str
@@ -83,7 +83,7 @@ class StatementVerdict:
 
 
 def verdict_of(rows: Sequence[StatementVerdict]) -> str:
-    """refuted if one row is, else undecided if one is, else holds."""
+    """``refuted`` if one row is, else ``undecided`` if one is, else ``holds``."""
     if any(row.holds is False for row in rows):
         return "refuted"
     return "undecided" if any(row.holds is None for row in rows) else "holds"
@@ -101,11 +101,11 @@ class ExplanationStep:
 class Audit(Tabular):
     """The audit of one claim about one system.
 
-    why: what explains the verdict, each step checked.  solves: the systems whose equations of motion the claim
-    satisfies on its smooth branch, or that keep the integral or relation.  kind: motion, integral, relation or value.
-    constants: names in the residuals with what they stand for, such as k/2.  entry: of the library, where it is one.
+    why: the explanation of the verdict, each step checked.  solves: the systems whose equations of motion the claim
+    satisfies on its smooth branch, or under which the integral or relation is invariant.  kind: a key of :data:`ABOUT`.
+    constants: names in the residuals with their meanings, such as k/2.  entry: of the library, where it is one.
     deciding: of an undecided claim, assumptions each of which decides it, with the verdict then.
-    unused: parameters of a file that stand in its assumptions at most.  where: what is 0 where an integral is claimed.
+    unused: parameters of a file that no formula uses.  where: formulas that are 0 where an integral is claimed.
     """
 
     claim: str
@@ -195,12 +195,12 @@ def _judge_one(statement: Statement, setting: Setting, prover: Prover) -> Statem
         closed = None if proof is None else _closed_form(statement, setting, proof)
         return _row(statement, False, closed or f"{witness['value']} at the witness", conditions, witness)
     for text, rate in statement.flow.kept if statement.flow is not None else ():
-        # where it is 0 at a witness, its own rate may not be
+        # where the rate is 0 at a witness, its own rate may not be
         rates = (rate, statement.flow.rate(rate)) if statement.flow is not None else ()
-        left = next((w for r in rates for w in _witnesses(replace(statement, residual=r), setting, prover)), None)
-        if left is not None:
-            residual = f"the flow leaves {text} = 0, at the rate {left['value']} at the witness"
-            return _row(statement, False, residual, conditions, left)
+        witness = next((w for r in rates for w in _witnesses(replace(statement, residual=r), setting, prover)), None)
+        if witness is not None:
+            residual = f"the flow leaves {text} = 0, at the rate {witness['value']} at the witness"
+            return _row(statement, False, residual, conditions, witness)
     if certain:
         return _row(statement, True, "0", conditions)
     residual = "0 where the conditions are met" if proven else _bound(statement, prover)
@@ -239,7 +239,7 @@ def _witnesses(
 
 
 def _texts(ball: arb) -> tuple[str, str]:
-    """(value, radius) to 20 digits, whatever the exponent: no exact number is made of one such as exp(-10^9)."""
+    """(value, radius) to 20 digits, for any exponent: balls such as exp(-10^9) are not made exact numbers."""
     if max(abs(_power_of_2(part)) for part in (ball.mid(), ball.rad())) < _MOST_BITS:
         return value_text(ball, 20)
     value, _, radius = ball.str(20).strip("[]").partition(" +/- ")
@@ -254,7 +254,7 @@ def _power_of_2(number: arb) -> int:
 
 @where_provable(None)
 def _ball(residual: sympy.Expr, values: Mapping[sympy.Symbol, Fraction], bits: int) -> arb | None:
-    """The residual at one place; None where it is undefined there."""
+    """The residual at one point; None where it is undefined."""
     ball = evaluate(residual, values, bits)
     return ball if ball.is_finite() else None
 
@@ -276,7 +276,7 @@ def _bound(statement: Statement, prover: Prover) -> str:
 
 @where_provable(None)
 def _closed_form(statement: Statement, setting: Setting, field_: Field) -> str | None:
-    """The residual as (constant) · (part), such as -(k/2)·gamma3; else as it stands, if it is short."""
+    """The residual as (constant) · (part), such as -(k/2)·gamma3, else as an expression, if it is short."""
     residual = field_.enter(statement.residual)
     for name, part in (("", sympy.Integer(1)), *setting.parts.get(statement.branch, ())):
         value = field_.enter(part)

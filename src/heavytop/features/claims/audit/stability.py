@@ -1,8 +1,7 @@
-"""An equilibrium or a permanent rotation that is claimed to be stable, or not, as a point of the equations in Ω and γ.
+"""Claims that an equilibrium or a permanent rotation is stable, or unstable, in Ω and γ.
 
-Stable is Lyapunov's: Ω and γ stay as close to the claimed ones as one likes, for all time, if they start close enough.
-First the claimed ones have to be constant solutions.  Then the criteria of :mod:`heavytop.top.stability` are proven
-over the whole domain; what refutes is the opposite, proven at a sample.
+Stability is Lyapunov's.  First the claimed Ω and γ are proven to be a constant solution, and then the criteria of
+:mod:`heavytop.top.stability` on the whole domain.  A proof of the opposite at a sample refutes the claim.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.prover import Condition
 from heavytop.features.claims.algebra.ring import where_provable
 from heavytop.features.claims.algebra.statement import ALL, TIME, Statement
-from heavytop.features.claims.algebra.structure import rationals
+from heavytop.features.claims.algebra.structure import rational_values
 from heavytop.features.claims.audit.context import ClaimFile
 from heavytop.features.claims.audit.judge import Progress, StatementVerdict, silent, verdict_of
 from heavytop.features.claims.audit.user_claims import UserMotion
@@ -38,10 +37,8 @@ class UserStability(UserMotion):
 
     def __init__(self, content: ClaimFile) -> None:
         super().__init__(content)
-        table = content.motion
-        assert table is not None
         moves = TIME in sympy.Tuple(*self.motion.state).free_symbols
-        if moves or table.omega is None or table.gamma is None or self.motion.attitude:
+        if moves or self.table.omega is None or self.table.gamma is None or self.motion.attitude:
             cause = "A claim of stability needs omega and gamma in [motion], constant in time, and no attitude."
             raise InputError(cause, "State the equilibrium or permanent rotation in parameters.")
         if content.quadrature is not None or content.times is not None or content.domain != "all":
@@ -81,11 +78,9 @@ class UserStability(UserMotion):
         p, y = self.context.parameters(about), self.motion.state
         at_once = Statement("", 1, "", replace(ALL, points=(Fraction(0),)), sympy.Integer(0), "")
         for sample in self.setting.sample_points(at_once):
-            numbers = rationals(sample)
-            exact = [e.xreplace(numbers) for e in (*p.inertia, *p.moment, *y)]
-            if not all(value.is_Rational for value in exact):
+            values = rational_values((*p.inertia, *p.moment, *y), sample)
+            if values is None:
                 continue
-            values = [Fraction(int(value.p), int(value.q)) for value in exact]
             top = Parameters(tuple(values[:3]), tuple(values[3:6]), Fraction(0))
             steady = stability(about, top, values[6:])
             if steady is not None and steady.verdict == ("unstable" if self.content.stable else "stable"):
@@ -103,7 +98,7 @@ class UserStability(UserMotion):
 
 @where_provable(None)
 def _sign(assumptions: Assumptions, e: sympy.Expr) -> int | None:
-    """0 or 1 where the expression is proven to be 0, or positive, and defined all over the domain; else None."""
+    """0 or 1 where the expression is proven to be 0, or positive, and defined on the whole domain; else None."""
     field = Field(assumptions, [sympy.sympify(e)])
     value = field.enter(sympy.sympify(e))
     sign, signs = field.tower.sign(value), field.tower.signs

@@ -5,8 +5,8 @@ The fields, integrals and angles are those of :mod:`heavytop.top`, over sympy.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import sympy
@@ -49,11 +49,11 @@ Identities = tuple[tuple[sympy.Expr, str], ...]
 class ClaimedMotion:
     """A claimed motion on one branch and domain, as expressions.
 
-    rate: the derivative in time.  angles: (φ, θ); rates: (φ', θ', ψ').
-    constants: (|γ|², C0, C1) that (1.3) should have; without them (1.3) says that the three are constant.
-    needs: what Ω and γ need to be defined.  attitude, angle_needs, pole: as in Formulas.
+    rate: the derivative in time.  rates: (φ', θ', ψ').
+    constants: (|γ|², C0, C1) of (1.3); without them (1.3) states that the three are constant.
+    needs: of Ω and γ.  attitude, angle_needs, pole: as in Formulas.
     clock: of a quadrature, F' and 1/F', which have to be continuous for the motion to exist.
-    turned: of a quaternion or a matrix, what is 0 where it is the attitude, each with the equation in words.
+    identities: of a quaternion or a matrix, residuals that are 0 for an attitude, each with its equation.
     """
 
     branch: str
@@ -69,7 +69,7 @@ class ClaimedMotion:
     angle_needs: frozenset[Need] = frozenset()
     pole: str = ""
     clock: tuple[sympy.Expr, ...] = ()
-    turned: tuple[tuple[sympy.Expr, str], ...] = ()
+    identities: Identities = ()
 
     @property
     def state(self) -> tuple[sympy.Expr, ...]:
@@ -86,49 +86,51 @@ class ClaimedMotion:
         """The formulas that the equations in the angles rest on."""
         return Formulas((*self.state, *self.clock), self.needs, self.attitude, self.angle_needs, self.pole)
 
+    def compared(
+        self, equation: str, left: Iterable[sympy.Expr], right: Iterable[sympy.Expr], text: str
+    ) -> Iterator[Statement]:
+        """The statements that two vectors are equal, which rest on the angles."""
+        for component, (a, b) in enumerate(zip(left, right, strict=True), 1):
+            yield Statement(equation, component, self.branch, self.domain, a - b, text, self.angle_formulas)
+
 
 def attitude(phi: sympy.Expr, theta: sympy.Expr, psi: sympy.Expr) -> tuple[sympy.Expr, ...]:
-    """γ and ξ of the angles: they are continuous where the attitude is, at the poles too."""
+    """γ and ξ of the angles, which are continuous where the attitude is, at the poles too."""
     return (*gamma_from_angles(phi, theta, SYMBOLIC), *attitude_from_angles(phi, theta, psi, SYMBOLIC))
 
 
 def motion_statements(motion: ClaimedMotion, p: Parameters, system: System) -> Iterator[Statement]:
     """(1.1), (1.2), (1.3) and, where there are angles, (3.1), each component, about ``system``."""
     y = motion.state
-    turning = "(Omega + lambda*e2)" if system is GYROSTAT else "Omega"
+    velocity = "(Omega + lambda*e2)" if system is GYROSTAT else "Omega"
     torque = "" if system is GYROSTAT else " + P*gamma x r"
     carried = ", M = I*Omega + k" if system is HEAVY_GYROSTAT else ""
     field = system.rates(p, y)
     for index, (value, claimed) in enumerate(zip(y, field, strict=True)):
-        text = f"gamma' = gamma x {turning}" if index >= 3 else f"M' = M x {turning}{torque}{carried}"
+        text = f"gamma' = gamma x {velocity}" if index >= 3 else f"M' = M x {velocity}{torque}{carried}"
         residual = motion.rate(value) - claimed
         yield _statement("1.2" if index >= 3 else "1.1", index % 3 + 1, motion, residual, text)
     yield from _integral_statements(motion, p, system)
+    omega = system.angular_velocity(p, y)
     if motion.phi is not None and motion.rates is not None:
-        turned = omega_from_angles(motion.gamma, motion.phi, motion.rates, SYMBOLIC)
-        actual = system.angular_velocity(p, y)
-        for component, (ours, theirs) in enumerate(zip(actual, turned, strict=True), 1):
-            text = f"{turning} = psi', theta', phi' of the angles"
-            statement = _statement("3.1", component, motion, ours - theirs, text)
-            yield replace(statement, formulas=motion.angle_formulas)
-    for component, (residual, text) in enumerate(_turning(motion, system.angular_velocity(p, y)), 1):
-        yield replace(_statement("attitude", component, motion, residual, text), formulas=motion.angle_formulas)
-
-
-def _turning(motion: ClaimedMotion, omega: Sequence[sympy.Expr]) -> Iterator[tuple[sympy.Expr, str]]:
-    """Residuals that are 0 where a quaternion or a matrix is the attitude: its own identities, and ξ' = ξ × Ω."""
-    if motion.turned:
-        yield from motion.turned
+        of_angles = omega_from_angles(motion.gamma, motion.phi, motion.rates, SYMBOLIC)
+        text = f"{velocity} = psi', theta', phi' of the angles"
+        yield from motion.compared("3.1", omega, of_angles, text)
+    if motion.identities:
         xi = motion.attitude[:3]
-        for ours, theirs in zip(map(motion.rate, xi), cross(xi, omega), strict=True):
-            yield ours - theirs, "xi' = xi x Omega, the first row of R"
+        equations = [
+            (ours - theirs, "xi' = xi x Omega, the first row of R")
+            for ours, theirs in zip(map(motion.rate, xi), cross(xi, omega), strict=True)
+        ]
+        for component, (residual, text) in enumerate((*motion.identities, *equations), 1):
+            yield Statement("attitude", component, motion.branch, motion.domain, residual, text, motion.angle_formulas)
 
 
 def of_quaternion(q: Sequence[sympy.Expr], rate: Derivative) -> tuple[tuple[sympy.Expr, ...], Triple, Identities]:
     """R row by row, Ω = 2 Im(q* q'), and |q|² = 1."""
     w, *v = q
-    turn = cross(v, [rate(part) for part in v])
-    omega = [2 * (w * rate(part) - rate(w) * part - across) for part, across in zip(v, turn, strict=True)]
+    products = cross(v, [rate(part) for part in v])
+    omega = [2 * (w * rate(part) - rate(w) * part - product) for part, product in zip(v, products, strict=True)]
     return (
         tuple(part for row in matrix_of_quaternion(q) for part in row),
         (omega[0], omega[1], omega[2]),
@@ -170,7 +172,7 @@ def _statement(equation: str, component: int, motion: ClaimedMotion, residual: s
 
 
 def why_not_equivalent() -> Sequence[ExplanationStep]:
-    """The general steps, each a polynomial identity in Ω, γ, δ, I and P r, checked by expanding it.
+    """The general steps, each a polynomial identity in Ω, γ, δ, I and P r, checked by expansion.
 
     Along (1.1) with γ' = γ × Ω + δ the rates of (1.3) are 2γ·δ, M·δ and P r·δ; so they force δ = 0 only where
     det(γ, M, r) is not 0.  And |M|² = C0² with (1.3) makes |M − C0 γ|² = 0.
@@ -188,13 +190,13 @@ def why_not_equivalent() -> Sequence[ExplanationStep]:
 
     m = momentum(p, state)
     c0 = sympy.Symbol("C0")
-    off = [ours - c0 * g for ours, g in zip(m, gamma, strict=True)]
+    difference = [momentum - c0 * g for momentum, g in zip(m, gamma, strict=True)]
     square = momentum_squared(p, state) - 2 * c0 * area(p, state) + c0**2 * gamma_squared(p, state)
     along = "with gamma' = gamma x Omega + delta and (1.1):"
     identities = [
         (
             "|M|^2 = C0^2 with (1.3) makes |M - C0*gamma|^2 = C0^2 - 2*C0*C0 + C0^2 = 0: M is parallel to gamma (2.1)",
-            dot(off, off) - square,
+            dot(difference, difference) - square,
         ),
         (f"{along} (|gamma|^2)' = 2*gamma.delta", rate(gamma_squared(p, state)) - 2 * dot(gamma, delta)),
         (f"{along} (M.gamma)' = M.delta", rate(area(p, state)) - dot(m, delta)),
@@ -216,4 +218,4 @@ def determinant(motion: ClaimedMotion, p: Parameters) -> Statement:
 
 
 SYSTEMS = (HEAVY_TOP, GYROSTAT)
-"""Systems of the paper, and of tops without k."""
+"""The systems of the paper, and of tops without k."""

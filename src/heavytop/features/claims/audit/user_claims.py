@@ -18,11 +18,11 @@ from msgspec import structs
 from heavytop.errors import HeavyTopError, InputError
 from heavytop.features.claims.algebra.conditions import (
     Need,
-    all_over,
     conditions_for_zero,
     is_exactly_zero,
     is_small_polynomial,
     on_conditions,
+    reduced_everywhere,
 )
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Assumptions, Field
@@ -170,9 +170,10 @@ class UserMotion(FileClaim):
     def __init__(self, content: ClaimFile) -> None:
         super().__init__(content)
         assert content.motion is not None
+        self.table = content.motion
         self.clock = _with_times(read_clock(content, self.context), content)
         self.context = _with_constant_rotor(self.context, self.clock)
-        self.motion = _read_motion(content.motion, self.context, self.clock)
+        self.motion = _read_motion(self.table, self.context, self.clock)
 
     @property
     def variables(self) -> tuple[sympy.Symbol, ...]:
@@ -190,16 +191,11 @@ class UserMotion(FileClaim):
         motion = self.motion
         if system is GYROSTAT:
             motion = replace(motion, needs=motion.needs | self.context.rotor_needs)
-        return [*motion_statements(motion, self.context.parameters(system), system), *self._angles_give_gamma()]
-
-    def _angles_give_gamma(self) -> Iterator[Statement]:
-        table = self.content.motion
-        if table is not None and table.angles is not None and table.gamma is not None:
-            turned = self.motion.attitude[:3]
-            for component, (ours, theirs) in enumerate(zip(turned, self.motion.gamma, strict=True), 1):
-                text = "(3.2): gamma of the angles is gamma"
-                formulas = self.motion.angle_formulas
-                yield Statement("3.2", component, "smooth", self.motion.domain, ours - theirs, text, formulas)
+        statements = [*motion_statements(motion, self.context.parameters(system), system)]
+        if self.table.angles is not None and self.table.gamma is not None:
+            of_angles = self.motion.attitude[:3]
+            statements += self.motion.compared("3.2", of_angles, motion.gamma, "(3.2): gamma of the angles is gamma")
+        return statements
 
     def solves(self, about: System, rows: Sequence[StatementVerdict]) -> tuple[str, ...]:
         """The systems that (1.1), (1.2) and |γ| = 1 are proven for."""
@@ -232,7 +228,7 @@ def _read_motion(table: ClaimedMotionTable, context: Context, clock: Clock) -> C
         first, second, third = (shortest(formula, setting_of(context, clock.variable), domain) for formula in formulas)
         return first, second, third
 
-    turned: tuple[sympy.Expr, ...] = ()
+    rotation: tuple[sympy.Expr, ...] = ()
     identities: Identities = ()
     attitude_needs: frozenset[Need] = frozenset()
     phi = rates = None
@@ -243,26 +239,26 @@ def _read_motion(table: ClaimedMotionTable, context: Context, clock: Clock) -> C
     if table.angles is not None:
         formulas = three(table.angles, names, "motion.angles")
         phi, theta, psi = reduced(_expressions(formulas))
-        rates, turned = (rate(phi), rate(theta), rate(psi)), attitude(phi, theta, psi)
-        gamma, attitude_needs = (turned[0], turned[1], turned[2]), needs_of(formulas)
+        rates, rotation = (rate(phi), rate(theta), rate(psi)), attitude(phi, theta, psi)
+        gamma, attitude_needs = (rotation[0], rotation[1], rotation[2]), needs_of(formulas)
     elif table.quaternion is not None or table.matrix is not None:
-        turned, omega, identities, attitude_needs = _read_rotation(table, names, rate)
-        gamma = turned[6], turned[7], turned[8]
+        rotation, omega, identities, attitude_needs = _read_rotation(table, names, rate)
+        gamma = rotation[6], rotation[7], rotation[8]
     elif table.omega is None or table.gamma is None:
         cause = "[motion] has neither an attitude nor both omega and gamma."
         raise InputError(cause, "Give omega and gamma, or angles, a quaternion or a matrix.")
     needs |= attitude_needs if table.gamma is None or table.omega is None else frozenset()
     if table.gamma is not None:
         formulas = three(table.gamma, names, "motion.gamma")
-        own, needs = reduced(_expressions(formulas)), needs | needs_of(formulas)
+        claimed, needs = reduced(_expressions(formulas)), needs | needs_of(formulas)
         if identities:
-            pairs = zip(own, gamma or (), strict=True)
+            pairs = zip(claimed, gamma or (), strict=True)
             identities += tuple((ours - theirs, "gamma is the third row of R") for ours, theirs in pairs)
-        gamma = own
+        gamma = claimed
     if table.omega is not None:
         formulas = three(table.omega, names, "motion.omega")
         omega, needs = reduced(_expressions(formulas)), needs | needs_of(formulas)
-    assert gamma is not None  # what is not given follows from the attitude
+    assert gamma is not None  # it is given, or follows from the attitude
     if rates is not None and omega is None:
         omega = omega_from_angles(gamma, phi, rates, SYMBOLIC)
     assert omega is not None
@@ -275,10 +271,10 @@ def _read_motion(table: ClaimedMotionTable, context: Context, clock: Clock) -> C
         phi,
         rates,
         needs=needs,
-        attitude=turned,
+        attitude=rotation,
         angle_needs=attitude_needs,
         clock=clock.values,
-        turned=identities,
+        identities=identities,
     )
 
 
@@ -294,7 +290,7 @@ def _read_rotation(
 
 
 def _with_times(clock: Clock, content: ClaimFile) -> Clock:
-    """With the times of the file as the first that a witness is looked for at."""
+    """The clock with the times of the file as the first points for a witness."""
     domain = clock.domain
     if content.times is None:
         return clock
@@ -303,21 +299,19 @@ def _with_times(clock: Clock, content: ClaimFile) -> Clock:
         raise InputError(
             f"A time of {', '.join(content.times)} lies outside {domain.label}.", "Change times or domain."
         )
-    return replace(
-        clock, domain=replace(domain, points=(*times, *(point for point in domain.points if point not in times)))
-    )
+    points = tuple(dict.fromkeys((*times, *domain.points)))
+    return replace(clock, domain=replace(domain, points=points))
 
 
-# Exact states on the conditions of a claim, where its file gives none: by elimination and a small search.
+# Exact states on the conditions of a claim whose file gives none: by elimination and a small search.
 #
-# A variable that occurs linearly is solved for, a polynomial in one variable gives its rational roots, and otherwise a
-# variable is given a value from a short list.  What is found is only proposed: whoever uses it proves that it lies on
-# the conditions.
+# A linear variable is eliminated, a polynomial in one variable gives its rational roots, and otherwise a variable gets
+# a value from a short list.  The states are only proposals: the caller proves that they lie on the conditions.
 
 
 # with points of the unit circle and sphere, such as (3/5, 4/5) and (2/3, 1/3, 2/3)
 _VALUES = tuple(sympy.Rational(*pair) for pair in ((2, 3), (1, 3), (4, 5), (3, 5), (-1, 2), (2, 1), (1, 1), (0, 1)))
-# the last for conditions with irrational numbers, which may have rational points at 0 only
+# 0 for conditions with irrational numbers, whose only rational point may be 0
 _SCALES = (1, -1, 1, -1, 20, -20, 0)
 _MOST_STEPS = 300
 _MOST_STATES = 24
@@ -328,11 +322,11 @@ def states_on(
     variables: Sequence[sympy.Symbol],
     parameters: Mapping[sympy.Symbol, Fraction],
 ) -> Iterator[dict[sympy.Symbol, Fraction]]:
-    """Rational values of ``variables`` where polynomial ``conditions`` are 0 at these parameters; none if not found."""
+    """Rational values of ``variables`` where polynomial ``conditions`` are 0 at these parameters, as far as found."""
     numbers = rationals(parameters)
-    # divisors that are 0 there are refused where the state is checked
+    # states with a divisor 0 are rejected by the caller
     equations = [
-        # one zero of sin u is as good as another
+        # u = 0 suffices for sin u = 0
         sympy.numer(sympy.together(condition.subs(numbers, simultaneous=True).replace(sympy.sin, lambda u: u)))
         for condition in conditions
     ]
@@ -341,20 +335,20 @@ def states_on(
 
 
 class _Search:
-    """Depth first, with an end to the number of steps."""
+    """A depth-first search with a limited number of steps."""
 
     def __init__(self, variables: Sequence[sympy.Symbol]) -> None:
         self._variables = tuple(variables)
         self._steps = 0
 
     def states(self, equations: Sequence[sympy.Expr]) -> Iterator[dict[sympy.Symbol, Fraction]]:
-        """The states found, up to a number."""
+        """The states, up to a number."""
         yield from islice(self._solve([sympy.expand(equation) for equation in equations], {}, 0), _MOST_STATES)
 
     def _solve(
         self, equations: list[sympy.Expr], known: dict[sympy.Symbol, sympy.Expr], depth: int
     ) -> Iterator[dict[sympy.Symbol, Fraction]]:
-        """Completions of ``known``: expressions of variables in those that are still free."""
+        """Completions of ``known``, the eliminated variables as expressions in the free ones."""
         self._steps += 1
         equations = [equation for equation in equations if equation != 0]
         if self._steps > _MOST_STEPS or any(equation.is_number for equation in equations):
@@ -362,13 +356,13 @@ class _Search:
         if not equations:
             yield from self._filled(known, depth)
             return
-        for x, value, deeper in self._choices(equations, depth):
+        for x, value, guesses in self._choices(equations, depth):
             reduced = [sympy.expand(equation.subs(x, value)) for equation in equations]
             values = {symbol: expression.subs(x, value) for symbol, expression in known.items()}
-            yield from self._solve(reduced, {**values, x: value}, depth + deeper)
+            yield from self._solve(reduced, {**values, x: value}, depth + guesses)
 
     def _choices(self, equations: Sequence[sympy.Expr], depth: int) -> Iterator[tuple[sympy.Symbol, sympy.Expr, int]]:
-        """Values of a variable that solve an equation or make it simpler, each with how many are only tried."""
+        """(variable, value, whether it is a guess): solutions of an equation, or values that make it simpler."""
         if solved := self._linear(equations):
             yield (*solved, 0)
             return
@@ -380,12 +374,12 @@ class _Search:
             elif len(symbols) == 1:
                 yield from ((symbols[0], root, 0) for root in sympy.Poly(factor, symbols[0]).ground_roots())
             else:
-                # what is left is to be as simple as can be: the variable of the highest power gets a value first
+                # the variable of the highest power gets a value first, which leaves the simplest equation
                 x = max(symbols, key=lambda symbol: (sympy.degree(factor, symbol), str(symbol)))
                 yield from ((x, _VALUES[(index + depth) % len(_VALUES)], 1) for index in range(len(_VALUES)))
 
     def _linear(self, equations: Sequence[sympy.Expr]) -> tuple[sympy.Symbol, sympy.Expr] | None:
-        """A variable that one of the equations gives as a polynomial in the others."""
+        """A variable that an equation determines as a polynomial in the others."""
         for equation in equations:
             for x in reversed(self._variables):
                 if x in equation.free_symbols:
@@ -395,15 +389,15 @@ class _Search:
         return None
 
     def _filled(self, known: Mapping[sympy.Symbol, sympy.Expr], depth: int) -> Iterator[dict[sympy.Symbol, Fraction]]:
-        """With values for what is free: of either sign, and of several sizes."""
+        """Numbers for all variables, with values of both signs and several sizes for the free ones."""
         free = [x for x in self._variables if x not in known]
-        for turn, scale in enumerate(_SCALES if free else _SCALES[:1]):
-            values = {x: scale * _VALUES[(turn + i + depth) % (len(_VALUES) - 1)] for i, x in enumerate(free)}
+        for shift, scale in enumerate(_SCALES if free else _SCALES[:1]):
+            values = {x: scale * _VALUES[(shift + i + depth) % (len(_VALUES) - 1)] for i, x in enumerate(free)}
             numbers = {
                 x: known[x].subs(values, simultaneous=True) if x in known else values[x] for x in self._variables
             }
             if all(number.is_Rational for number in numbers.values()):
-                yield {x: Fraction(int(number.p), int(number.q)) for x, number in numbers.items()}
+                yield {x: Fraction(number) for x, number in numbers.items()}
 
 
 # A first integral or an invariant relation claimed in a file as statements.
@@ -412,10 +406,10 @@ class _Search:
 _STATES = (
     ("1/2", "-2/3", "3/4", "2/3", "-1/3", "2/3"),
     ("1", "2", "-1", "3/5", "0", "4/5"),
-    # of other signs, and beyond the first period of an angle
+    # of other signs, with angles beyond the first period
     ("-4", "-7/2", "9/2", "-2/7", "6/7", "-3/7"),
 )
-# states of our own, where a file gives none
+# the number of states on the conditions, where a file gives none
 _ENOUGH = 3
 _BITS = 192
 # 0 at every state of a body: |γ|² - 1
@@ -454,12 +448,12 @@ class UserIntegral(FileClaim):
 
     @property
     def setting(self) -> Setting:
-        """That of the states."""
+        """The setting with the states as samples."""
         return self.at_states
 
     @cached_property
     def at_states(self) -> Setting:
-        """The file's assumptions; the samples are its parameters at each of the states."""
+        """The file's assumptions, with its parameters at each of the states as samples."""
         base = setting_of(self.context, TIME)
         conditions = [part for formula in self._zero for part in conditions_for_zero(formula.expression)]
         samples = tuple({**row, **state} for row in self.context.samples for state in self._states(conditions, row))
@@ -473,19 +467,19 @@ class UserIntegral(FileClaim):
         return (*self.where, self.value) if self.kind == "relation" else self.where
 
     def _states(self, conditions: Sequence[sympy.Expr], parameters: Mapping[sympy.Symbol, Fraction]) -> list[Point]:
-        """The states of the file; without them states of our own, on the conditions where such are found."""
+        """The states of the file, else fixed states, or states on the conditions where none of these lies there."""
         states = _numbers(self._table.states or _STATES)
         if self._table.states is not None:
             return states
         needs = needs_of([self.value, *self.where])
 
-        def serves(state: Point) -> bool:
+        def is_valid(state: Point) -> bool:
             point = {**parameters, **state}
             return all(is_exactly_zero(c, point) for c in conditions) and all(need.is_met(point) for need in needs)
 
-        if any(serves(state) for state in states):
+        if any(map(is_valid, states)):
             return states
-        samples = [*islice(filter(serves, states_on([*conditions, OFF_SPHERE], STATE, parameters)), _ENOUGH)]
+        samples = [*islice(filter(is_valid, states_on([*conditions, OFF_SPHERE], STATE, parameters)), _ENOUGH)]
         return samples or states
 
     def statements(self, system: System) -> list[Statement]:
@@ -502,7 +496,7 @@ class UserIntegral(FileClaim):
         value, named, names = self._with_names(rate, needs)
         is_relation = self.kind == "relation"
         flow = Flow(rate, frozenset((*STATE, *names)), self._kept(rate), is_relation, (OFF_SPHERE,), names)
-        # a condition in simpler words is the same set
+        # the simpler conditions have the same zeros
         where = tuple(part for formula in self.where for part in conditions_for_zero(formula.expression))
         rotor = (self.context.rotor,) if system is GYROSTAT and self.context.rotor is not None else ()
         values = (*self._parts(value), *where, *rotor)
@@ -519,13 +513,13 @@ class UserIntegral(FileClaim):
         return rate_along(dict(zip(STATE, rates, strict=True)))
 
     def _parts(self, value: sympy.Expr) -> tuple[sympy.Expr, ...]:
-        """Expressions to be constant: F; or, of a relation other than a polynomial, its parts: |L| has no rate at 0."""
+        """The expressions to be constant: F, or the parts of a relation that is no polynomial: |L| has no rate at 0."""
         if self.kind != "relation" or value.is_polynomial(*STATE):
             return (value,)
         return conditions_for_zero(value) or (value,)
 
     def _kept(self, rate: Rate) -> tuple[tuple[str, sympy.Expr], ...]:
-        """The side conditions with their rates; a relation has none of its own where it is as simple as can be."""
+        """The side conditions with their rates, and those of a relation that is split into simpler ones."""
         simpler = {formula: conditions_for_zero(formula.expression) for formula in self._zero}
         return tuple(
             (str(formula.expression if len(parts) == 1 else part), self._on_relations(rate(part)))
@@ -540,13 +534,13 @@ class UserIntegral(FileClaim):
     def _with_names(
         self, rate: Rate, needs: frozenset[Need]
     ) -> tuple[sympy.Expr, frozenset[Need], dict[sympy.Symbol, sympy.Expr]]:
-        """(F, its needs, symbols): first integrals in F have got symbols, where nothing else of the state is left.
+        """(F, its needs, symbols): with symbols for first integrals in F, where nothing else of the state remains.
 
-        F is written as it is where |γ| = 1.
+        F is reduced by |γ| = 1.
         """
         if self.kind == "relation":
             return self.value.expression, needs, {}
-        value = all_over(self.value.expression, [OFF_SPHERE])
+        value = reduced_everywhere(self.value.expression, [OFF_SPHERE])
         assumptions = self.setting.assumptions(0)
         state = frozenset(STATE)
         names = Names(state, lambda e: _is_constant(rate(e), assumptions, self.setting.samples))
@@ -554,7 +548,8 @@ class UserIntegral(FileClaim):
         if named.free_symbols & state:
             return value, needs, {}
         renamed = frozenset(
-            Need(need.kind, names.put_into(all_over(need.expression, [OFF_SPHERE])), need.text) for need in needs
+            Need(need.kind, names.put_into(reduced_everywhere(need.expression, [OFF_SPHERE])), need.text)
+            for need in needs
         )
         return named, renamed, names.meanings
 
@@ -582,8 +577,8 @@ def _check_states(table: IntegralTable) -> None:
 def _is_constant(
     rate: sympy.Expr, assumptions: Assumptions, samples: Sequence[Mapping[sympy.Symbol, Fraction]]
 ) -> bool:
-    """Whether a rate is proven to be 0 by an algebra that divides by nothing that may be 0."""
-    # what is not 0 at a sample need not be taken into the algebra
+    """Whether a rate is proven to be 0 without divisors that may be 0."""
+    # a rate that is not 0 at a sample needs no algebra
     balls = [evaluate(rate, {TIME: Fraction(0), **sample}, _BITS) for sample in samples[:1]]
     if any(ball.is_finite() and not ball.contains(0) for ball in balls):
         return False
