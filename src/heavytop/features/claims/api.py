@@ -44,7 +44,7 @@ def audit(claim: str | os.PathLike[str], system: System | str | None = None, *, 
 class ClaimLibrary(Tabular, Sequence[Entry]):
     """Entries of the library with their verdicts, by id.
 
-    entries: what stands in each file.  verdicts: of each of them, by id.
+    entries: the contents of each file.  verdicts: of each entry, by id.
     """
 
     entries: tuple[Entry, ...]
@@ -58,7 +58,7 @@ class ClaimLibrary(Tabular, Sequence[Entry]):
 
     @property
     def changed(self) -> tuple[str, ...]:
-        """Ids of the entries whose verdict is another than the expected one, and is one."""
+        """Ids of the entries whose verdict is not the expected one, nor undecided."""
         return tuple(e.id for e in self.entries if self.verdicts[e.id].verdict not in (e.expects, _OPEN))
 
     @property
@@ -68,7 +68,7 @@ class ClaimLibrary(Tabular, Sequence[Entry]):
 
     @property
     def exit_code(self) -> ExitCode:
-        """0 where every verdict is the expected one, 1 where one is another, else 3 where one is undecided."""
+        """0 where every verdict is the expected one, 1 where one is different, else 3 where one is undecided."""
         return ExitCode.FINDING if self.changed else ExitCode.INCOMPLETE if self.undecided else ExitCode.GOOD
 
     def to_json(self) -> dict[str, Any]:
@@ -110,8 +110,8 @@ def claim_library(
 
     Arguments:
         tag: the entries with that tag alone.
-        anew: audit every entry, whatever is known from before; else an audit of the same entry by the same program
-            stands, from the cache of the user.
+        anew: audit every entry; else the cache of the user gives the verdict of an earlier audit of the same entry by
+            the same program.
         done: called after each verdict.
 
     Returns:
@@ -120,7 +120,7 @@ def claim_library(
     Raises:
         InputError: for a tag that no entry has.
     """
-    wanted = None if tag is None else require_tag(arguments.text(tag, "tag"))
-    told = arguments.callback(done, "done") or (lambda: None)
-    entries = tuple(entry for entry in library().values() if wanted is None or wanted in entry.tags)
-    return ClaimLibrary(entries, judged(entries, anew=bool(arguments.flag(anew, "anew")), done=told))
+    known = None if tag is None else require_tag(arguments.text(tag, "tag"))
+    callback = arguments.callback(done, "done") or (lambda: None)
+    entries = tuple(entry for entry in library().values() if known is None or known in entry.tags)
+    return ClaimLibrary(entries, judged(entries, anew=bool(arguments.flag(anew, "anew")), done=callback))

@@ -12,7 +12,7 @@ from heavytop.cli.output import counted, followed, waiting
 from heavytop.errors import ExitCode, InputError
 
 _AUDIT_SECONDS, _FIGURE_SECONDS, _ENTRY_SECONDS = 6.0, 1.0, 1.0
-"""Expected, for the time left: of an audit, of each figure, and of each entry of the library."""
+"""Expected durations of an audit, of each figure, and of each entry of the library."""
 
 
 @command

@@ -1,4 +1,4 @@
-"""The library of claims in words, for people."""
+"""Texts of audits and of the library of claims for the terminal."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ def _folded(text: str, indent: int) -> list[str]:
 
 
 def unexpected_text(listing: ClaimLibrary) -> RenderableType:
-    """How many verdicts are the expected ones, and each that is not."""
-    off = [entry for entry in listing.entries if entry.id in (*listing.changed, *listing.undecided)]
-    total = f"{len(listing.entries) - len(off)} of {len(listing.entries)} verdicts are the expected ones."
-    lines = [Text(total)]
-    for entry in off:
+    """The number of expected verdicts, and each unexpected one."""
+    unexpected = [entry for entry in listing.entries if entry.id in (*listing.changed, *listing.undecided)]
+    expected = len(listing.entries) - len(unexpected)
+    lines = [Text(f"{expected} of {len(listing.entries)} verdicts are the expected ones.")]
+    for entry in unexpected:
         judged = listing.verdicts[entry.id]
         difference = f"{entry.id}: {judged.verdict}, expected: {entry.expects}"
         difference += f"; {judged.reason}" if judged.reason else ""
@@ -57,17 +57,17 @@ def unexpected_text(listing: ClaimLibrary) -> RenderableType:
     return Group(*lines, Text(f"{seconds:.0f} s of audits."))
 
 
-# The audit of published numbers as a table, for people.
+# The audit of published numbers as a table.
 
 
 _WIDEST_TIME = 16
-"""Characters of a time; the lines below the table have all of it."""
+"""Characters of a time; the lines below the table have the full text."""
 
 
 def values_text(rows: Sequence[StatementVerdict]) -> list[RenderableType]:
-    """A line for each number: what is printed, how many of its digits are right, and by how much it is off.
+    """A line for each number: the printed text, the number of correct digits, and the error.
 
-    Below it the proven values, with the radius of each, and how the motion is known.
+    Below the table the proven values, with their radii, and how the motion is known.
     """
     table = Table(box=None, pad_edge=False)
     for name in ("number", "at", "verdict", "printed", "digits right", "allowed", "off by"):
@@ -77,8 +77,7 @@ def values_text(rows: Sequence[StatementVerdict]) -> list[RenderableType]:
         right = f"{figures['digits_right']} of {figures['digits_printed']}" if "digits_right" in figures else "?"
         cells = [figures.get("printed", ""), right, figures.get("tolerance", "half a unit")]
         cells.append(row.residual.removeprefix("off by "))
-        place = Text(label(row)), Text(clip(row.domain, _WIDEST_TIME))
-        table.add_row(*place, _verdict(row.holds), *map(Text, cells))
+        table.add_row(Text(label(row)), Text(clip(row.domain, _WIDEST_TIME)), _verdict(row.holds), *map(Text, cells))
     proven = [row for row in rows if row.figures and "proven" in row.figures]
     lines = [Text("Proven: the true number is within the radius of the value.")] if proven else []
     for row in proven:
@@ -89,11 +88,11 @@ def values_text(rows: Sequence[StatementVerdict]) -> list[RenderableType]:
 
 
 def label(row: StatementVerdict) -> str:
-    """The quantity, with its component where it has more than one."""
+    """The quantity, with its component where it has several."""
     return f"{row.equation} {row.component}" if row.equation in SIZES else row.equation
 
 
-# An audit in words and tables, for people.
+# The other audits as text and tables.
 
 
 _PROVEN = {
@@ -108,11 +107,11 @@ M = I*Omega (+ k of a rotor), r = (a, b, c): centre of mass; residual: left side
 minus right, of (1.1) solved for Omega', with the claimed omega and gamma.
 Equations, and alpha and k of the paper: `heavytop docs claim`."""
 _RESIDUAL = 20
-"""Characters of a line of a residual: what a terminal of 80 columns leaves to it."""
+"""Characters of a line of a residual, for a terminal of 80 columns."""
 
 
 def audit_text(report: Audit) -> RenderableType:
-    """Verdict, a table of the equations, the witnesses of what is refuted, and why."""
+    """The verdict, a table of the equations, witnesses, conditions and the explanation."""
     head = Text(f"{report.claim} as {ABOUT[report.kind]} of {report.system}: ")
     head.append(report.verdict, style=_STYLES[report.verdict])
     parts: list[RenderableType] = [head]
@@ -129,7 +128,7 @@ def audit_text(report: Audit) -> RenderableType:
         parts.append(Text(f"No formula uses {', '.join(report.unused)} of [parameters]."))
     if report.why:
         parts += [Text(), Text("Why, each step checked by the same algebra:")]
-        parts += [Text(f"  [{VERDICTS[finding.holds]}] {finding.statement}") for finding in report.why]
+        parts += [Text(f"  [{VERDICTS[step.holds]}] {step.statement}") for step in report.why]
     parts += _entry(report)
     solved = ", ".join(report.solves) or "none of the systems known here"
     where = f", where {' and '.join(f'{text} = 0' for text in report.where)}" if report.where and report.solves else ""
@@ -138,7 +137,7 @@ def audit_text(report: Audit) -> RenderableType:
 
 
 def _entry(report: Audit) -> list[RenderableType]:
-    """The lines of an entry of the library: how its source was read, the verdict expected, its note."""
+    """The lines of an entry of the library: how its source was read, the expected verdict, its note."""
     entry = report.entry
     if entry is None:
         return []
@@ -147,25 +146,25 @@ def _entry(report: Audit) -> list[RenderableType]:
 
 
 def _table(report: Audit) -> Table:
-    """A line a statement; branch and domain stand in it where the claim has more than the smooth one and all times."""
-    own = _own(report)
+    """A line for each statement."""
+    columns = _columns(report)
     table = Table(box=None, pad_edge=False)
-    for name in ("equation", *own, "verdict", "residual", "statement"):
+    for name in ("equation", *columns, "verdict", "residual", "statement"):
         table.add_column(name, overflow="fold", no_wrap=name not in ("residual", "statement"))
     for row in report.rows:
-        cells = (Text(value) for value in (_label(row), *(getattr(row, name) for name in own)))
+        cells = (Text(value) for value in (_label(row), *(getattr(row, name) for name in columns)))
         table.add_row(*cells, _verdict(row.holds), Text(_in_lines(row.residual)), Text(row.statement))
     return table
 
 
-def _own(report: Audit) -> list[str]:
-    """The columns branch and domain, where the claim has more than the smooth one and all times."""
-    usual = {"branch": {"smooth"}, "domain": {"all"}}
-    return [name for name in usual if {getattr(row, name) for row in report.rows} != usual[name]]
+def _columns(report: Audit) -> list[str]:
+    """The columns branch and domain, where the claim has others than the smooth branch and all times."""
+    defaults = {"branch": {"smooth"}, "domain": {"all"}}
+    return [name for name in defaults if {getattr(row, name) for row in report.rows} != defaults[name]]
 
 
 def _indented(title: str, lines: Sequence[tuple[str | Text, str]]) -> list[RenderableType]:
-    """Texts behind their labels, below a title; nothing where there are none."""
+    """Labelled texts below a title; nothing without texts."""
     table = Table.grid(padding=(0, 1))
     table.add_column(no_wrap=True)
     for label, text in lines:
@@ -174,7 +173,7 @@ def _indented(title: str, lines: Sequence[tuple[str | Text, str]]) -> list[Rende
 
 
 def _in_lines(expression: str) -> str:
-    """The expression in lines of at most 20 characters, broken behind an operator or a space, never inside a name."""
+    """The expression in lines of at most 20 characters, broken after an operator or a space, never inside a name."""
     lines = [""]
     for part in re.findall(r"[\w.]+'*\)*|\W", expression):
         if lines[-1] and len((lines[-1] + part).rstrip()) > _RESIDUAL:
@@ -189,22 +188,24 @@ def _label(row: StatementVerdict) -> str:
 
 
 def _witnesses(report: Audit) -> list[RenderableType]:
-    """Where each refuted equation fails: exact parameters, an exact time, and a ball that excludes 0."""
-    refuted = [row for row in report.rows if row.witness is not None]
+    """The witnesses of refuted equations: exact parameters, an exact time, and a ball that excludes 0."""
     points = []
-    for row in refuted:
-        witness = dict(row.witness or {})
+    for row in report.rows:
+        if row.witness is None:
+            continue
+        witness = dict(row.witness)
         parameters = witness.pop("parameters")
         ball = f"{witness.pop('value')} +/- {witness.pop('radius')}" if "value" in witness else row.residual
         point = ", ".join(f"{name}={number}" for name, number in {**parameters, **witness}.items())
-        points.append((" ".join([_label(row), *(getattr(row, name) for name in _own(report))]), f"{ball} at {point}"))
+        label = " ".join([_label(row), *(getattr(row, name) for name in _columns(report))])
+        points.append((label, f"{ball} at {point}"))
     notes = sorted({(f"{row.branch} {row.domain}", row.note) for row in report.rows if row.note})
     title = "Witnesses, with the residual as a ball that excludes 0"
     return _indented(title, points) + _indented("The domains", notes)
 
 
 def _conditions(report: Audit) -> list[RenderableType]:
-    """The conditions of the proofs, each once: first what is not discharged, with the rows that it leaves open."""
+    """The conditions of the proofs: first those that are not discharged, with the rows that they leave undecided."""
     rows: dict[tuple[bool, str, str], list[str]] = {}
     for row in report.rows:
         if row.holds is not False:

@@ -1,4 +1,4 @@
-"""`audit`: one claim, one system, a verdict for every equation and the reason for it."""
+"""Audits of claims by name or file, in this process or in one of their own, and the verdicts on the library."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 import signal
 import sys
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
@@ -173,7 +173,7 @@ def only_branch(report: Audit, branch: str) -> Audit:
     return replace(report, rows=rows)
 
 
-# The verdicts on the library of claims: audited now, or found in the cache by what they follow from.
+# The verdicts on the library of claims: audited now, or from the cache, whose key is a digest of entry and program.
 
 
 SECONDS = 60.0
@@ -183,9 +183,9 @@ _ROOMS = ("features/claims", "top", "exact")
 
 
 class Judged(msgspec.Struct, frozen=True):
-    """The verdict on an entry, and the seconds that its audit took when it was made.
+    """The verdict on an entry, and the duration of its audit.
 
-    reason: why a verdict is missing, where the audit was stopped or the file cannot be judged.
+    reason: why the verdict is missing, where the audit was stopped or the file is invalid.
     """
 
     verdict: Verdict
@@ -193,14 +193,11 @@ class Judged(msgspec.Struct, frozen=True):
     reason: str = ""
 
 
-Done = Callable[[], None]
-
-
-def audited(entry: Entry, system: str = "") -> tuple[Judged, Audit | None]:
-    """The audit of an entry; undecided, with None, where it is stopped or its file cannot be judged."""
+def audited(entry: Entry) -> tuple[Judged, Audit | None]:
+    """The audit of an entry; undecided, with None, where it is stopped or the file is invalid."""
     began = perf_counter()
     try:
-        audit = in_time(str(FOLDER / f"{entry.id}.toml"), system, SECONDS)
+        audit = in_time(str(FOLDER / f"{entry.id}.toml"), "", SECONDS)
     except AuditEnded:
         raise
     except HeavyTopError as error:
@@ -210,51 +207,52 @@ def audited(entry: Entry, system: str = "") -> tuple[Judged, Audit | None]:
 
 @cache
 def own_system(name: str) -> str:
-    """The system that an entry is about, by the keys of its file: ``about`` of its claim, but no formula is read."""
+    """The system of an entry, by the keys of its file: ``about`` of its claim, without parsing formulas."""
     table = tomllib.loads((FOLDER / f"{name}.toml").read_text("utf-8"))
     carries = isinstance((table.get("top") or table["body"]).get("rotor"), list)
     return str(table.get("system") or (HEAVY_GYROSTAT if carries else HEAVY_TOP).name)
 
 
-def judged(entries: Iterable[Entry], *, anew: bool = False, done: Done = lambda: None) -> dict[str, Judged]:
-    """The verdict on each entry by its id, as many audits at once as there are processors.
+def judged(
+    entries: Sequence[Entry], *, anew: bool = False, done: Callable[[], None] = lambda: None
+) -> dict[str, Judged]:
+    """The verdict on each entry by its id, in as many audits at once as there are processors.
 
-    anew: whatever the cache holds.  done: called after each.
+    anew: without the cache.  done: called after each.
     Raises AuditEnded where the process of an audit ends without an answer.
     """
-    todo = list(entries)
 
-    def one(entry: Entry) -> Judged:
-        judged = None if anew else _kept(entry)
+    def verdict(entry: Entry) -> Judged:
+        judged = None if anew else _cached_verdict(entry)
         if judged is None:
             judged, _ = audited(entry)
-            with suppress(OSError, InputError):  # a cache that cannot be written is left out
-                path = _cached(entry)
+            with suppress(OSError, InputError):  # without a cache that can be written
+                path = _cache_file(entry)
                 path.parent.mkdir(parents=True, exist_ok=True)
                 files.replace(path, msgspec.json.encode(judged))
         done()
         return judged
 
     with ThreadPoolExecutor(max_workers=processors()) as pool:
-        return dict(zip((entry.id for entry in todo), pool.map(one, todo), strict=True))
+        return dict(zip((entry.id for entry in entries), pool.map(verdict, entries), strict=True))
 
 
-def _kept(entry: Entry) -> Judged | None:
-    """The verdict in the cache on exactly this entry and this program."""
+def _cached_verdict(entry: Entry) -> Judged | None:
+    """The verdict in the cache on exactly this entry by this program."""
     try:
-        return msgspec.json.decode(_cached(entry).read_bytes(), type=Judged)
+        return msgspec.json.decode(_cache_file(entry).read_bytes(), type=Judged)
     except (OSError, msgspec.DecodeError, msgspec.ValidationError):
         return None
 
 
-def _cached(entry: Entry) -> Path:
+def _cache_file(entry: Entry) -> Path:
     content = (FOLDER / f"{entry.id}.toml").read_bytes()
     return files.cache_folder("claims") / f"{hashlib.sha256(_program() + content).hexdigest()}.json"
 
 
 @cache
 def _program() -> bytes:
-    """A digest of what a verdict follows from: the versions of Python and its algebra, and the source of the rooms."""
+    """A digest of the versions of Python, SymPy and FLINT, and of the source of the rooms that determine a verdict."""
     digest = hashlib.sha256(sys.version.encode())
     for name in ("sympy", "flint"):
         digest.update(str(__import__(name).__version__).encode())

@@ -1,8 +1,8 @@
-"""Claims of kind `value`: published numbers of a state, against balls that are proven to hold the true ones.
+"""Claims of kind `value`: published numbers of a state, against balls that are proven to contain the true numbers.
 
-Each number has a verdict of its own: it is right where the ball lies within the source's tolerance of it, or within
-half a unit of its last digit; wrong where the ball lies outside; and undecided otherwise.  The balls are those of
-closed forms and validated enclosures (:mod:`heavytop.exact.bodies`), made narrower until they decide.
+A number is right where the ball lies within the source's tolerance of it, or within half a unit of its last digit;
+wrong where the ball lies outside; and undecided otherwise.  The balls are those of closed forms and validated
+enclosures (:mod:`heavytop.exact.bodies`), made narrower until they decide.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from heavytop.exact.bodies import BodyMotion
 
 
-# A number as it stands in print: its value, the unit of its last digit, and how many of its digits are right.
+# A number as it is printed: its value, the unit of its last digit, and the number of its correct digits.
 
 
 _DECIMAL = re.compile(r"[+-]?(?P<integer>[0-9]*)(?:\.(?P<part>[0-9]*))?(?:[eEdD](?P<power>[+-]?[0-9]{1,5}))?")
@@ -61,7 +61,7 @@ _REMEDY = "Write it as it is printed, as text: a decimal such as 0.450, -1.5e-3 
 
 @dataclass(frozen=True, slots=True)
 class PrintedNumber:
-    """A decimal number with so many digits written; zeros at the end count, those at the front do not.
+    """A decimal number with its printed digits; zeros at the end count, those at the front do not.
 
     text: as it is printed.  unit: of the last digit.  digits: from the first that is not 0; of 0.000 all of them.
     """
@@ -91,26 +91,26 @@ class PrintedNumber:
         return cls(text.strip(), (-size if plain.startswith("-") else size) * unit, unit, digits)
 
     def right(self, error: Fraction) -> int:
-        """How many digits are right of a number that is off by ``error`` ≥ 0: the most that are so to half a unit."""
-        room, count = self.half_unit, self.digits
-        while count and error > room:
-            count, room = count - 1, room * 10
+        """The number of correct digits for an error ≥ 0: the most of which the last is right to half a unit."""
+        limit, count = self.half_unit, self.digits
+        while count and error > limit:
+            count, limit = count - 1, limit * 10
         return count
 
     @property
     def half_unit(self) -> Fraction:
-        """Half a unit of the last digit: by so much the true number may be off and be printed so."""
+        """Half a unit of the last digit: the rounding error of a printed number."""
         return self.unit / 2
 
 
 SIZES = {"omega": 3, "gamma": 3, "omega_space": 3, "quaternion": 4, "position": 3}
 """Components of each quantity; a first integral has one."""
 _FIRST_BITS, _FEWEST_BITS, _MOST_BITS = 64, 20, 66_500
-"""Absolute bits of the balls: what is tried first, what is tried where that is out of reach, and where it ends."""
+"""Absolute bits of the balls: the first trial, a second one where that is out of reach, and the most."""
 _SPARE_BITS = 24
 _DOUBLINGS = 3
 _MORE_DIGITS, _WITNESS_DIGITS = 5, 20
-"""Digits of the proven value that are shown beyond those printed, and of the difference."""
+"""Digits of the proven value beyond those printed, and of the difference."""
 _INVARIANT = ("gamma_squared", "area", "energy", "momentum_squared")
 """First integrals that are the same in any axes."""
 
@@ -136,7 +136,7 @@ class BodyTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class StartTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """[start]: Ω in body or space axes, and γ or an attitude; normalize: of numbers that are off by their rounding."""
+    """[start]: Ω in body or space axes, and γ or an attitude; normalize: for rounded components."""
 
     omega: Three | None = None
     omega_space: Three | None = None
@@ -159,7 +159,7 @@ class ValueTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ValueFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The whole file."""
+    """The file."""
 
     name: Annotated[str, msgspec.Meta(max_length=80)]
     kind: Literal["value"]
@@ -173,10 +173,10 @@ class ValueFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """One published number, read.
+    """One published number.
 
-    time_text: as the file has it.  tolerance: that of the source; None for half a unit of the last digit.
-    place: in the file, as errors name it.
+    time_text: as in the file.  tolerance: that of the source; None for half a unit of the last digit.
+    place: its name in error texts, by its index in the file.
     """
 
     time: Fraction
@@ -190,40 +190,40 @@ class Figure:
 
     @property
     def allowed(self) -> Fraction:
-        """By how much it may be off."""
+        """The largest error of a right number."""
         return self.number.half_unit if self.tolerance is None else self.tolerance
 
     @property
     def bits(self) -> int:
-        """Absolute bits of a ball that decides it, most times."""
-        least = min(self.number.half_unit, self.allowed or self.number.half_unit)
-        return max(0, least.denominator.bit_length() - least.numerator.bit_length()) + _SPARE_BITS
+        """Absolute bits of a ball that usually decides it."""
+        limit = min(self.number.half_unit, self.allowed or self.number.half_unit)
+        return max(0, limit.denominator.bit_length() - limit.numerator.bit_length()) + _SPARE_BITS
 
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """The judgement of a ball on a number.
+    """The verdict of a ball on a number.
 
-    holds: None where it is too wide.  right: digits that are proven to be right.  decided: whether a narrower ball
-    would say no more.  middle, wide: of the ball.  off: by how much the number is off, as an interval.
+    holds: None where the ball is too wide.  right: the number of proven correct digits.  decided: whether a narrower
+    ball would give the same.  middle, radius: of the ball.  error: of the number, as an interval.
     """
 
     holds: bool | None
     right: int
     decided: bool
     middle: Fraction
-    wide: Fraction
-    off: tuple[Fraction, Fraction]
+    radius: Fraction
+    error: tuple[Fraction, Fraction]
 
 
 def judge_figure(figure: Figure, known: Fraction | arb) -> Judgement:
     """The verdict on a number whose true value is ``known``, exactly or as a ball."""
-    middle, wide = (known, Fraction(0)) if isinstance(known, Fraction) else (midpoint(known), radius(known))
-    apart = abs(figure.number.value - middle)
-    low, high = max(Fraction(0), apart - wide), apart + wide
+    middle, r = (known, Fraction(0)) if isinstance(known, Fraction) else (midpoint(known), radius(known))
+    distance = abs(figure.number.value - middle)
+    low, high = max(Fraction(0), distance - r), distance + r
     holds = True if high <= figure.allowed else False if low > figure.allowed else None
-    least, most = figure.number.right(high), figure.number.right(low)
-    return Judgement(holds, least, holds is not None and least == most, middle, wide, (low, high))
+    fewest, most = figure.number.right(high), figure.number.right(low)
+    return Judgement(holds, fewest, holds is not None and fewest == most, middle, r, (low, high))
 
 
 class ValueClaim:
@@ -234,13 +234,13 @@ class ValueClaim:
         self.figures = tuple(_figures(content.value))
         self.motion = _read_motion(content)
 
-    def about(self, asked: System | None) -> System:
-        """The system asked for, else the file's, else `heavy_gyrostat` where there is a rotor, else `heavy_top`.
+    def about(self, requested: System | None) -> System:
+        """The system requested, else the file's, else `heavy_gyrostat` where there is a rotor, else `heavy_top`.
 
-        Raises InputError where the file names another one, or the system does not admit the body.
+        Raises InputError where the file names another system, or the system does not admit the body.
         """
-        usual = HEAVY_TOP if self.motion[0].rotor is None else HEAVY_GYROSTAT
-        about = of_file(asked, self.content.system, usual)
+        default = HEAVY_TOP if self.motion[0].rotor is None else HEAVY_GYROSTAT
+        about = of_file(requested, self.content.system, default)
         require_no_other_rotor(about, self.motion[0])
         return about
 
@@ -250,7 +250,7 @@ class ValueClaim:
         return Audit(content.name, about.name, content.source, self.rows(about), kind=content.kind, entry=self.entry)
 
     def rows(self, about: System) -> tuple[StatementVerdict, ...]:
-        """A verdict on each number, in the order of the file; raises InputError for a quantity that is not known."""
+        """A verdict on each number, in the order of the file; raises InputError for an unknown quantity."""
         motion = _KnownNumbers(*self.motion, about)
         motion.require(self.figures)
         try:
@@ -267,8 +267,8 @@ class ValueClaim:
 
 
 def _figures(tables: Sequence[ValueTable]) -> Iterator[Figure]:
-    """The numbers of a file; raises InputError for an invalid one, and where one stands twice."""
-    seen: dict[tuple[Fraction, str, int], int] = {}
+    """The numbers of a file; raises InputError for an invalid or repeated one."""
+    indices: dict[tuple[Fraction, str, int], int] = {}
     for index, table in enumerate(tables, 1):
         place = f"value {index}"
         time = _number(table.time, f"{place}: time")
@@ -278,9 +278,9 @@ def _figures(tables: Sequence[ValueTable]) -> Iterator[Figure]:
             lacks = "of a component that is not named" if table.component is None else f"has no component {component}"
             raise InputError(f"{place}: {table.quantity[:40]} {lacks}.", f"Its components are 1 to {size}.")
         subject = time, table.quantity, component
-        if seen.setdefault(subject, index) != index:
-            repeated = f"{table.quantity[:40]} {component} at t = {table.time[:40]}"
-            raise InputError(f"{place}: {repeated} stands in value {seen[subject]} already.", "Give each number once.")
+        if indices.setdefault(subject, index) != index:
+            repeated = f"{table.quantity[:40]} {component} at t = {table.time[:40]} stands in value {indices[subject]}"
+            raise InputError(f"{place}: {repeated} already.", "Give each number once.")
         tolerance = None if table.tolerance is None else _number(table.tolerance, f"{place}: tolerance")
         if tolerance is not None and tolerance < 0:
             cause = f"{place}: tolerance must not be negative; got {quoted(str(table.tolerance))[1:-1]}."
@@ -317,7 +317,7 @@ def _read_motion(content: ValueFile) -> tuple[HeavyTop | Body, State]:
 
 
 def _rows_of(group: Sequence[Figure], motion: _KnownNumbers) -> list[StatementVerdict]:
-    """The rows of the numbers of one quantity at one time, each judged by the narrowest ball that was made."""
+    """The rows of the numbers of one quantity at one time, each judged by the narrowest ball."""
     judged: list[Judgement] | None = None
     missing = "the balls that can be proven do not decide whether that is within what is allowed"
     needed = min(_MOST_BITS, max(_FIRST_BITS, *(figure.bits for figure in group)))
@@ -335,23 +335,23 @@ def _rows_of(group: Sequence[Figure], motion: _KnownNumbers) -> list[StatementVe
 
 
 def _judged(group: Sequence[Figure], known: Sequence[Fraction | arb]) -> list[Judgement]:
-    """The judgements of balls; of a quaternion with the sign that the numbers have, as q and -q are one attitude."""
-    same = [judge_figure(figure, known[figure.component - 1]) for figure in group]
+    """The verdicts of balls; of a quaternion with the sign of the numbers, as q and -q are one attitude."""
+    judged = [judge_figure(figure, known[figure.component - 1]) for figure in group]
     if group[0].quantity != "quaternion":
-        return same
+        return judged
     opposite = [-value if isinstance(value, Fraction) else value.neg(exact=True) for value in known]
-    other = [judge_figure(figure, opposite[figure.component - 1]) for figure in group]
+    of_opposite = [judge_figure(figure, opposite[figure.component - 1]) for figure in group]
 
     def rank(judged: Sequence[Judgement]) -> tuple[int, Fraction]:
         verdicts = [judgement.holds for judgement in judged]
         worst = 2 if False in verdicts else 1 if None in verdicts else 0
-        return worst, sum((judgement.off[1] ** 2 for judgement in judged), Fraction(0))
+        return worst, sum((judgement.error[1] ** 2 for judgement in judged), Fraction(0))
 
-    return min(same, other, key=rank)
+    return min(judged, of_opposite, key=rank)
 
 
 def _row(figure: Figure, judged: Judgement | None, method: str, missing: str) -> StatementVerdict:
-    """The row of a number; missing: why no balls were found for it, or none that are narrower."""
+    """The row of a number; missing: why there is no ball, or no narrower one."""
     name = figure.quantity if figure.quantity not in SIZES else f"{figure.quantity} {figure.component}"
     allowed = "half a unit of the last digit" if figure.tolerance is None else figure.tolerance_text
     figures: dict[str, Any] = {"printed": figure.number.text}
@@ -359,12 +359,12 @@ def _row(figure: Figure, judged: Judgement | None, method: str, missing: str) ->
     figures["digits_printed"] = figure.number.digits
     residual, witness = missing, None
     if judged is not None:
-        value, wide = _texts(judged.middle, judged.wide, figure.number.digits + _MORE_DIGITS)
-        figures |= {"digits_right": judged.right, "proven": {"value": value, "radius": wide}}
-        residual = _off(judged) + (f"; {missing}" if judged.holds is None else "")
+        value, r = _texts(judged.middle, judged.radius, figure.number.digits + _MORE_DIGITS)
+        figures |= {"digits_right": judged.right, "proven": {"value": value, "radius": r}}
+        residual = _error_text(judged) + (f"; {missing}" if judged.holds is None else "")
     if judged is not None and judged.holds is False:
-        apart = _texts(figure.number.value - judged.middle, judged.wide, _WITNESS_DIGITS)
-        witness = {"parameters": {}, "t": figure.time_text, "value": apart[0], "radius": apart[1]}
+        value, r = _texts(figure.number.value - judged.middle, judged.radius, _WITNESS_DIGITS)
+        witness = {"parameters": {}, "t": figure.time_text, "value": value, "radius": r}
     return StatementVerdict(
         figure.quantity,
         figure.component,
@@ -379,26 +379,22 @@ def _row(figure: Figure, judged: Judgement | None, method: str, missing: str) ->
     )
 
 
-def _texts(middle: Fraction, wide: Fraction, digits: int) -> tuple[str, str]:
-    """(value, radius) of a ball as decimal text: the radius encloses the rounding of the value."""
+def _texts(middle: Fraction, r: Fraction, digits: int) -> tuple[str, str]:
+    """(value, radius) of a ball as decimal text: the radius includes the rounding of the value."""
     text = decimal_text(middle, digits)
-    return text, radius_text(wide + abs(Fraction(text) - middle))
+    return text, radius_text(r + abs(Fraction(text) - middle))
 
 
-def _off(judged: Judgement) -> str:
-    """By how much a number is off, in words."""
-    low, high = (decimal_text(round_to(part, 64), 3) if part else "0" for part in judged.off)
+def _error_text(judged: Judgement) -> str:
+    low, high = (decimal_text(round_to(part, 64), 3) if part else "0" for part in judged.error)
     if low == high:
         return f"off by {high}"
-    most = radius_text(judged.off[1])
+    most = radius_text(judged.error[1])
     return f"off by less than {most}" if low == "0" else f"off by {low} to {most}"
 
 
 class _KnownNumbers:
-    """The true numbers of a motion, exactly where they are rational for certain, else as balls.
-
-    body, start: as given.  system: of the motion.
-    """
+    """The true numbers of a motion, as fractions where they are known to be rational, else as balls."""
 
     def __init__(self, body: HeavyTop | Body, start: State, system: System) -> None:
         from heavytop.exact.bodies import BodyMotion
@@ -410,19 +406,19 @@ class _KnownNumbers:
 
     @cached_property
     def method(self) -> str:
-        """How the motion is known."""
+        """The method by which the motion is known."""
         try:
             return self.motion.method
         except OutOfReach as error:
             return error.cause
 
     def require_handy(self, figures: Sequence[Figure]) -> None:
-        """Raises OutOfReach for fractions whose exact arithmetic takes longer than anyone waits."""
+        """Raises OutOfReach for fractions whose exact arithmetic takes too long."""
         resolved = self.motion.resolved
         require_handy(resolved.top, resolved.start, [figure.time for figure in figures])
 
     def require(self, figures: Sequence[Figure]) -> None:
-        """Raises InputError for an unknown quantity, and one that γ alone does not fix."""
+        """Raises InputError for an unknown quantity, and for one that γ alone does not determine."""
         for figure in figures:
             place = f"{figure.place} (component {figure.component}, t = {figure.time_text[:40]})"
             if figure.quantity not in SIZES and figure.quantity not in self._integrals:
@@ -442,7 +438,6 @@ class _KnownNumbers:
     @cached_property
     def _integrals(self) -> dict[str, Integral]:
         """The first integrals that are constant along the motion, by name."""
-
         resolved = self.motion.resolved
         integrals = holding(resolved.top, resolved.start, self.system)
         return {integral.name: integral for integral in integrals if self._exact or integral.name in _INVARIANT}
@@ -472,7 +467,7 @@ class _KnownNumbers:
         return components
 
     def _integral(self, integral: Integral, bits: int) -> Fraction | arb:
-        """A first integral at the start: exactly, or as a ball of an irrational attitude."""
+        """A first integral at the start: exactly, or as a ball for an irrational attitude."""
         resolved, body, start = self.motion.resolved, self.body, self.start
         if self._exact:
             p = self.system.parameters(resolved.top, resolved.start)

@@ -1,4 +1,4 @@
-"""Every equation of a claim, proven or refuted: of the paper as a motion of each system, and of the library."""
+"""Audits in plans: every equation of the paper's claims, for each system, and of the library's."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _SECONDS = 1.5
 
 
 class AuditTable(PlanTable, tag=NAME):
-    """The claims, and the systems whose motions those of the paper are said to be.
+    """The claims, and the systems that those of the paper are audited for.
 
     claims: "ershkov-general", "ershkov-partial", ids of the library, or "library" for every entry of it.
     systems: without them that of each claim, the heavy top of the paper's.  An entry of the library is about its own.
@@ -35,7 +35,7 @@ class AuditTable(PlanTable, tag=NAME):
     systems: tuple[str, ...] = ()
 
     def tasks(self, find: Find) -> list[Task]:
-        """One a row; raises InputError for an unknown claim or system, and for a system that a claim is not about."""
+        """A task for each row; raises InputError for an unknown claim or system, and one that a claim is not about."""
         from heavytop.features.claims.audit.audit import PAPER, own_system  # loads SymPy, which no other kind needs
 
         keys: list[RowKey] = []
@@ -49,10 +49,10 @@ class AuditTable(PlanTable, tag=NAME):
         """The systems of a claim's rows, "" for its own."""
         from heavytop.features.claims.audit.audit import PAPER, own_system, paper_claim
 
-        asked = [system(name) for name in self.systems]
+        requested = [system(name) for name in self.systems]
         if claim in PAPER:
-            return tuple(paper_claim(claim).about(system).name for system in asked) or (HEAVY_TOP.name,)
-        if asked and claim in library() and (own := own_system(claim)) not in self.systems:
+            return tuple(paper_claim(claim).about(system).name for system in requested) or (HEAVY_TOP.name,)
+        if requested and claim in library() and (own := own_system(claim)) not in self.systems:
             raise InputError(
                 f"The claim {claim} is about {own}, and systems = {quoted(list(self.systems))}.",
                 "Leave systems out: an entry of the library is about that of its file.",
@@ -74,7 +74,7 @@ def _entries(claim: str) -> list[str]:
 
 
 class AuditKind(Kind):
-    """1 for an equation that holds, 0 for one that is refuted, unresolved for one that is neither."""
+    """1 for an equation that holds, 0 for one that is refuted, unresolved for an undecided one."""
 
     name = NAME
     table = AuditTable
@@ -85,31 +85,27 @@ class AuditKind(Kind):
         return _SECONDS
 
     def measure(self, task: Task, saved: Saved) -> Row:
-        """The verdicts on a claim; about the gyrostat on its smooth branch alone, which the formulas solve."""
+        """The verdicts on a claim; for the gyrostat on its smooth branch alone, which the formulas solve."""
         from heavytop.features.claims.audit.audit import PAPER, paper_claim
         from heavytop.features.claims.audit.judge import judge
 
         if task.key.case not in PAPER:
             return _of_entry(task)
         claim, about = paper_claim(task.key.case), system(task.key.system)
-        asked = [
-            statement for statement in claim.statements(about) if about is HEAVY_TOP or statement.branch == _SMOOTH
-        ]
+        statements = [s for s in claim.statements(about) if about is HEAVY_TOP or s.branch == _SMOOTH]
         metrics = {
             Quantity(f"({row.equation})", str(row.component), "", row.branch, row.domain): _value(row.holds)
-            for row in judge(asked, claim.setting)
+            for row in judge(statements, claim.setting)
         }
         against = Against("equations", f"the equations of {task.key.system}")
         return exact_row(task, f"claimed: {claim.source}", against, by_name(metrics))
 
     def line(self, row: Row) -> str:
-        """The verdict, and how many equations are proven and refuted."""
+        """The verdict, and the numbers of equations that are proven and refuted."""
         return f"{_verdict(row)[0]}: {_counted(row)}"
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
-        """Whether the claims are motions of the heavy top, and how many of each system's equations are proven; how many
-        claims of the library hold, and whether that is what is expected.
-        """
+        """The verdict on the paper's claims, with the proven equations for each system, and on the library's."""
         entries = [row for row in rows if EXPECTED.text in row.metrics]  # of the library
         paper = [row for row in rows if EXPECTED.text not in row.metrics]
         if any(row.system == HEAVY_TOP.name for row in paper):
@@ -174,9 +170,9 @@ def _counted(row: Row) -> str:
 
 
 def _of_entry(task: Task) -> Row:
-    """Its equations, and whether its verdict is the expected one; where the audit is stopped that alone, unresolved.
+    """The equations of an entry, and whether its verdict is the expected one: unresolved where the audit is stopped.
 
-    Of published numbers also how many of their digits are right.
+    For published numbers also their correct digits.
     """
     from heavytop.features.claims.audit.audit import audited
 
@@ -200,14 +196,13 @@ def _of_entry(task: Task) -> Row:
 
 
 def _of_library(rows: Sequence[Row]) -> str:
-    """How many claims hold and are refuted, and those whose verdict is not the expected one."""
+    """The numbers of claims by verdict, and those whose verdict is not the expected one."""
     verdicts = [_verdict(row)[0] for row in rows]
-    counts = ((verdicts.count("holds"), "proven"), (verdicts.count("refuted"), "refuted"))
-    open_ones = verdicts.count("undecided")
-    counted = [f"{count} {what}" for count, what in (*counts, (open_ones, "undecided")) if count]
-    off = [row.case for row in rows if row.metrics[EXPECTED.text].value != "1"]
-    expected = f"not as expected: {', '.join(off)}" if off else "every verdict as expected"
-    return f"Library of {plural(len(rows), 'claim')}: {', '.join(counted)}; {expected}."
+    words = {"holds": "proven", "refuted": "refuted", "undecided": "undecided"}
+    counts = [f"{verdicts.count(verdict)} {word}" for verdict, word in words.items() if verdict in verdicts]
+    unexpected = [row.case for row in rows if row.metrics[EXPECTED.text].value != "1"]
+    expected = f"not as expected: {', '.join(unexpected)}" if unexpected else "every verdict as expected"
+    return f"Library of {plural(len(rows), 'claim')}: {', '.join(counts)}; {expected}."
 
 
 def _value(holds: bool | None) -> Metric:
@@ -216,12 +211,11 @@ def _value(holds: bool | None) -> Metric:
 
 def _equations_of(row: Row) -> list[Metric]:
     """The metrics of a row that are verdicts on its equations."""
-    others = EXPECTED.name, DIGITS
-    return [m for m in row.metrics.values() if m.quantity is None or m.quantity.name not in others]
+    return [m for m in row.metrics.values() if m.quantity is None or m.quantity.name not in (EXPECTED.name, DIGITS)]
 
 
 def _verdict(row: Row) -> tuple[str, list[Quantity], int]:
-    """The verdict, the equations that are refuted, and how many are proven."""
+    """The verdict, the refuted equations, and the number of proven ones."""
     equations = _equations_of(row)
     refuted = [metric.quantity or Quantity("?") for metric in equations if metric.value == "0"]
     held = sum(metric.value == "1" for metric in equations)

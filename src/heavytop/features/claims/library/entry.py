@@ -1,7 +1,7 @@
-"""An entry of the library of claims: what stands in its file beside the claim itself.
+"""The entries of the library of claims.
 
-Each entry is a TOML file `library/ID.toml`: a claim in the form of docs/claims-in-toml.md, with where it was published,
-how it was read, the verdict that is expected and what a reader should learn from it.
+Each entry is a TOML file `library/ID.toml`: a claim in the form of docs/claims-in-toml.md, with its publication, how it
+was read, the expected verdict and a note.
 """
 
 from __future__ import annotations
@@ -54,8 +54,8 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The keys of an entry about its claim.
 
-    id: never given to another.  read: what of the source was read.  expects: the verdict that its audit has to have.
-    note: what a reader should learn.  corrects: the entries that this one is the right form of.
+    id: never used for another entry.  read: the part of the source that was read.  expects: the expected verdict.
+    note: for readers.  corrects: the entries that this one is the right form of.
     """
 
     id: Id
@@ -77,9 +77,9 @@ class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def split(table: Mapping[str, Any], where: str) -> tuple[Entry | None, dict[str, Any]]:
-    """The entry in a TOML table, None where it has no id, and the table of its claim alone.
+    """(entry, claim): the entry in a TOML table, None without an id, and the table of its claim.
 
-    Raises InputError for keys of an entry that are wrong or missing.
+    Raises InputError for wrong or missing keys of an entry.
     """
     if "id" not in table:
         return None, dict(table)

@@ -1,8 +1,7 @@
 """The statements of the paper's two claims: `ershkov-general` (2.1)-(3.4) and `ershkov-partial` (4.1)-(6.2).
 
-Every formula is that of :mod:`heavytop.features.claims.library.ershkov` and
-:mod:`heavytop.features.claims.library.ershkov_general`, over sympy; a formula can be replaced to see what the audit
-makes of it.
+The formulas are those of :mod:`heavytop.features.claims.library.ershkov` and
+:mod:`heavytop.features.claims.library.ershkov_general`, over SymPy; each can be replaced, to audit another formula.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ from heavytop.features.claims.library.ershkov_general import GeneralConstants
 from heavytop.top.attitude import gamma_from_angles
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, VARIABLES, Parameters, System, energy, momentum_squared
 
-# Why a claim of the paper fails about the heavy top, and what it solves instead: each step checked by the audit.
+# Why a claim of the paper fails for the heavy top, and which system it solves: each step checked by the audit.
 
 
 _HOLDS = {"holds": True, "refuted": False, "undecided": None}
@@ -52,13 +51,15 @@ def explain(
         if verdicts["1.1"] == verdicts["1.2"] == "holds":
             solves.append(system.name)
         if system is GYROSTAT:
-            told = {
+            equations = {
                 "1.1": "M' = M x (Omega + lambda*e2), lambda = P*b/C0: the free gyrostat with a rotor on axis 2",
                 "1.2": "gamma' = gamma x (Omega + lambda*e2)",
                 "3.1": "(3.1) with omega = Omega + lambda*e2 in the place of Omega",
             }
             steps += [
-                ExplanationStep(f"it solves {told[name]}", _HOLDS[verdicts[name]]) for name in told if name in verdicts
+                ExplanationStep(f"it solves {text}", _HOLDS[verdicts[name]])
+                for name, text in equations.items()
+                if name in verdicts
             ]
     return steps, tuple(solves)
 
@@ -85,16 +86,16 @@ class _PaperClaim:
         motion: ClaimedMotion = self._motion(*self.branches[0])
         return motion
 
-    def about(self, asked: System | None) -> System:
-        """The system asked for, else the heavy top; raises InputError for one that the paper says nothing about."""
-        about = HEAVY_TOP if asked is None else asked
+    def about(self, requested: System | None) -> System:
+        """The system requested, else the heavy top; raises InputError for one that the paper says nothing about."""
+        about = HEAVY_TOP if requested is None else requested
         if about not in SYSTEMS:
             names = " or ".join(system.name for system in SYSTEMS)
             raise InputError(f"The paper says nothing about {about.name}.", f"Use {names}.")
         return about
 
     def statements(self: Any, system: System) -> list[Statement]:
-        """Every equation that the claim should satisfy as a motion of ``system``, and its own steps."""
+        """Every equation of a motion of ``system``, and the steps of the paper."""
         motions = [self._motion(branch, domain) for branch, domain in self.branches]
         about = [statement for motion in motions for statement in motion_statements(motion, self.parameters, system)]
         return [*about, *self._steps()]
