@@ -1,6 +1,6 @@
-"""Figs 2-8 of the paper as it defines them, and the same motions with the truth beside the claim; SVG and PNG.
+"""Figs 2-8 of the paper as it defines them, and the same motions with the true motion; SVG and PNG.
 
-matplotlib is drawn without a display and without a date, so that the same program gives the same files.
+matplotlib draws without a display and without a date, so that the same program gives the same files.
 """
 
 from __future__ import annotations
@@ -200,7 +200,7 @@ def _comparison(ratio: int) -> Any:
 
 
 def _portrait() -> Any:
-    """The momentum sphere of the gyrostat with its homoclinic orbit, and the true homoclinic orbit beside it."""
+    """The momentum sphere of the gyrostat with its homoclinic orbit, and the homoclinic orbit of the heavy top."""
     case = PartialCase(Fraction(1), Fraction(1), Fraction(1, 2))
     times = [Fraction(index, 10) for index in range(-140, 141)]
     moments = numpy.array([float(moment) for moment in case.solves.top.inertia])
@@ -323,4 +323,4 @@ FIGURES: dict[str, Callable[[], Any]] = {
     **{f"truth-ratio{ratio}": partial(_comparison, ratio) for ratio in (2, 6)},
     "momentum-sphere": _portrait,
 }
-"""Figs 2-8, the comparisons for I1/I3 = 2 and 6, the momentum sphere: how each file is drawn, by its name."""
+"""The functions that draw Figs 2-8, the comparisons for I1/I3 = 2 and 6, and the momentum sphere, by file name."""

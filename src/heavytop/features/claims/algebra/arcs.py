@@ -179,7 +179,7 @@ def _integer_relation(values: Sequence[Sequence[arb]]) -> list[int] | None:
     """Small integers with which the values add up to 0 in each component, within rounding; None without any."""
     with working_precision(NUMBER_BITS):
         matrix = [[(value.mid() * 2**_BITS).floor().unique_fmpz() for value in row] for row in values]
-    if any(value is None for row in matrix for value in row):  # not finite, or too large to be told
+    if any(value is None for row in matrix for value in row):  # not finite, or too wide
         return None
     scaled = [[int(value) for value in row] for row in matrix]
     count = len(values)

@@ -307,7 +307,7 @@ class Field:
         return fraction.xreplace({_placeholder(index): self.meaning(index) for index in occurring})
 
     def meaning(self, index: int) -> sympy.Expr:
-        """The expression that a generator stands for."""
+        """The expression of a generator."""
         g = self.tower.generators[index]
         if g.kind != "root":
             return g.meaning

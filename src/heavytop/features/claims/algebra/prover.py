@@ -330,7 +330,7 @@ class Region:
         return written(f"{e} {'!=' if need.kind is ConditionKind.NONZERO else '>'} 0") if e.free_symbols else ""
 
     def obstacle(self, values: Sequence[sympy.Expr]) -> str:
-        """The obstacle to the values being real and continuous all over the region."""
+        """The obstacle to a proof that the values are real and continuous on the whole region."""
         for value in values:
             try:
                 obstacle = self.regularity.obstacle(self.field.enter(value))

@@ -213,7 +213,7 @@ class Tower(PolynomialRing):
         return prod(roots, start=self.polynomial(outside)) * self.root_of_number(abs(constant))
 
     def _simplest_root(self, square: fmpq_mpoly) -> Quotient:
-        """√square as a sum of simpler roots where there is one, else as a generator."""
+        """√square as a sum of less nested roots where that exists, else as a generator."""
         if self.known_root(square) is None:
             simpler = denested(self, square)
             if simpler is not None:

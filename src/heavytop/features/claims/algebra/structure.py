@@ -15,7 +15,7 @@ from heavytop.features.claims.algebra.signs import PLUS, UNKNOWN, Sign, sign_of_
 
 
 class Defined(sympy.Dummy):  # type: ignore[misc]
-    """A symbol that stands for a formula and depends on its symbols.  meaning: that formula."""
+    """A symbol for a formula, which depends on the formula's symbols.  meaning: that formula."""
 
     meaning: sympy.Expr
 

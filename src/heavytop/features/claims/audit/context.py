@@ -233,7 +233,7 @@ _OF_PARAMETERS = "Relations are between parameters; conditions on the state stan
 class Context:
     """The context of a claim: names, assumptions, samples, and the top.
 
-    rotor: λ of a gyrostat, with what it needs.  carried: k of a heavy gyrostat.
+    rotor: λ of a gyrostat; rotor_needs: of it.  carried: k of a heavy gyrostat.
     """
 
     names: dict[str, Formula]
@@ -315,16 +315,13 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     needs = needs_of(formula for a, b, _ in sides for formula in (a, b))
     top = content.top
     moments = [parse(text, names, "top.inertia") for text in tensor]
-    arm = [*three(top.centre, names, "top.centre"), parse(top.weight, names, "top.weight")]
+    arm, weight = three(top.centre, names, "top.centre"), parse(top.weight, names, "top.weight")
     rotor = parse(top.rotor, names, "top.rotor") if isinstance(top.rotor, str) else None
     carried = three(top.rotor, names, "top.rotor") if isinstance(top.rotor, list) else ()
     relations = [parse(text, names, "relations") for text in content.relations]
-    _check_constant("top.inertia", moments, _OF_THE_TOP, variables)
-    _check_constant("top.centre", arm[:3], _OF_THE_TOP, variables)
-    _check_constant("top.weight", arm[3:], _OF_THE_TOP, variables)
-    _check_constant("top.rotor", carried, _OF_THE_TOP, variables)
-    _check_constant("relations", relations, _OF_PARAMETERS, variables)
-    weight = arm.pop()
+    for where, formulas in {"inertia": moments, "centre": arm, "weight": [weight], "rotor": carried}.items():
+        _require_constant(f"top.{where}", formulas, _OF_THE_TOP, variables)
+    _require_constant("relations", relations, _OF_PARAMETERS, variables)
     inertia = tensor_of([part.expression for part in moments], tensor)
     centre = tuple(part.expression for part in arm)
     context = Context(
@@ -368,7 +365,7 @@ def three(texts: Iterable[str], names: dict[str, Formula], where: str) -> tuple[
     return first, second, third
 
 
-def _check_constant(where: str, formulas: Sequence[Formula], remedy: str, variables: Iterable[sympy.Symbol]) -> None:
+def _require_constant(where: str, formulas: Sequence[Formula], remedy: str, variables: Iterable[sympy.Symbol]) -> None:
     """Raises InputError where a formula or one of its needs depends on a symbol that moves."""
     for formula in formulas:
         free = formula.expression.free_symbols.union(*(need.expression.free_symbols for need in formula.needs))

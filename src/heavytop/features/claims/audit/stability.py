@@ -46,9 +46,9 @@ class UserStability(UserMotion):
         if isinstance(self.context.top.inertia[0], tuple):
             raise InputError("A claim of stability needs principal axes.", "Give the three principal moments.")
 
-    def about(self, asked: System | None) -> System:
+    def about(self, requested: System | None) -> System:
         """The heavy top; raises InputError where the file or the caller names another."""
-        about = UserMotion.about(self, asked)
+        about = UserMotion.about(self, requested)
         if about is not HEAVY_TOP:
             raise InputError(f"A claim of stability must be about heavy_top; got {about.name}.", "Leave out the rotor.")
         return about

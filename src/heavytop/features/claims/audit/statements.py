@@ -42,7 +42,9 @@ SYMBOLIC = SimpleNamespace(**{n: getattr(sympy, n) for n in _NAMES}, arctan=symp
 Derivative = Callable[[sympy.Expr], sympy.Expr]
 Triple = tuple[sympy.Expr, sympy.Expr, sympy.Expr]
 Rows = Sequence[Sequence[sympy.Expr]]
-Identities = tuple[tuple[sympy.Expr, str], ...]
+Identity = tuple[sympy.Expr, str]
+"""An expression that is 0, and the equation in words."""
+Identities = tuple[Identity, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,12 +88,18 @@ class ClaimedMotion:
         """The formulas that the equations in the angles rest on."""
         return Formulas((*self.state, *self.clock), self.needs, self.attitude, self.angle_needs, self.pole)
 
-    def compared(
-        self, equation: str, left: Iterable[sympy.Expr], right: Iterable[sympy.Expr], text: str
-    ) -> Iterator[Statement]:
-        """The statements that two vectors are equal, which rest on the angles."""
-        for component, (a, b) in enumerate(zip(left, right, strict=True), 1):
-            yield Statement(equation, component, self.branch, self.domain, a - b, text, self.angle_formulas)
+
+def differences(left: Iterable[sympy.Expr], right: Iterable[sympy.Expr], text: str) -> Identities:
+    """The components of left − right, which are 0 by the equation ``text``."""
+    return tuple((a - b, text) for a, b in zip(left, right, strict=True))
+
+
+def numbered(
+    equation: str, branch: str, domain: Domain, identities: Iterable[Identity], formulas: Formulas = Formulas()
+) -> Iterator[Statement]:
+    """Identities as the components of one equation."""
+    for component, (residual, text) in enumerate(identities, 1):
+        yield Statement(equation, component, branch, domain, residual, text, formulas)
 
 
 def attitude(phi: sympy.Expr, theta: sympy.Expr, psi: sympy.Expr) -> tuple[sympy.Expr, ...]:
@@ -101,29 +109,26 @@ def attitude(phi: sympy.Expr, theta: sympy.Expr, psi: sympy.Expr) -> tuple[sympy
 
 def motion_statements(motion: ClaimedMotion, p: Parameters, system: System) -> Iterator[Statement]:
     """(1.1), (1.2), (1.3) and, where there are angles, (3.1), each component, about ``system``."""
-    y = motion.state
+    y, field = motion.state, system.rates(p, motion.state)
+    rates, omega = [motion.rate(value) for value in y], system.angular_velocity(p, y)
     velocity = "(Omega + lambda*e2)" if system is GYROSTAT else "Omega"
     torque = "" if system is GYROSTAT else " + P*gamma x r"
     carried = ", M = I*Omega + k" if system is HEAVY_GYROSTAT else ""
-    field = system.rates(p, y)
-    for index, (value, claimed) in enumerate(zip(y, field, strict=True)):
-        text = f"gamma' = gamma x {velocity}" if index >= 3 else f"M' = M x {velocity}{torque}{carried}"
-        residual = motion.rate(value) - claimed
-        yield _statement("1.2" if index >= 3 else "1.1", index % 3 + 1, motion, residual, text)
-    yield from _integral_statements(motion, p, system)
-    omega = system.angular_velocity(p, y)
+    in_state = {
+        "1.1": differences(rates[:3], field[:3], f"M' = M x {velocity}{torque}{carried}"),
+        "1.2": differences(rates[3:], field[3:], f"gamma' = gamma x {velocity}"),
+        "1.3": _integrals(motion, p, system),
+    }
+    in_angles: dict[str, Identities] = {}
     if motion.phi is not None and motion.rates is not None:
         of_angles = omega_from_angles(motion.gamma, motion.phi, motion.rates, SYMBOLIC)
-        text = f"{velocity} = psi', theta', phi' of the angles"
-        yield from motion.compared("3.1", omega, of_angles, text)
+        in_angles["3.1"] = differences(omega, of_angles, f"{velocity} = psi', theta', phi' of the angles")
     if motion.identities:
-        xi = motion.attitude[:3]
-        equations = [
-            (ours - theirs, "xi' = xi x Omega, the first row of R")
-            for ours, theirs in zip(map(motion.rate, xi), cross(xi, omega), strict=True)
-        ]
-        for component, (residual, text) in enumerate((*motion.identities, *equations), 1):
-            yield Statement("attitude", component, motion.branch, motion.domain, residual, text, motion.angle_formulas)
+        xi, text = motion.attitude[:3], "xi' = xi x Omega, the first row of R"
+        in_angles["attitude"] = (*motion.identities, *differences(map(motion.rate, xi), cross(xi, omega), text))
+    for equations, formulas in ((in_state, motion.formulas), (in_angles, motion.angle_formulas)):
+        for equation, identities in equations.items():
+            yield from numbered(equation, motion.branch, motion.domain, identities, formulas)
 
 
 def of_quaternion(q: Sequence[sympy.Expr], rate: Derivative) -> tuple[tuple[sympy.Expr, ...], Triple, Identities]:
@@ -144,31 +149,27 @@ def of_matrix(rows: Rows, rate: Derivative) -> tuple[tuple[sympy.Expr, ...], Tri
     one, two, three = transposed(rows)
     rates = transposed([[rate(part) for part in row] for row in rows])
     omega = dot(three, rates[1]), dot(one, rates[2]), dot(two, rates[0])
-    identities = [(dot(xi, xi) - 1, "|xi|^2 = 1, the first row of R"), (dot(xi, gamma), "xi.gamma = 0")]
-    identities += [(a - b, "eta = gamma x xi, the second row of R") for a, b in zip(eta, cross(gamma, xi), strict=True)]
-    return (*xi, *eta, *gamma), omega, tuple(identities)
+    identities = (dot(xi, xi) - 1, "|xi|^2 = 1, the first row of R"), (dot(xi, gamma), "xi.gamma = 0")
+    of_eta = differences(eta, cross(gamma, xi), "eta = gamma x xi, the second row of R")
+    return (*xi, *eta, *gamma), omega, (*identities, *of_eta)
 
 
-def _integral_statements(motion: ClaimedMotion, p: Parameters, system: System) -> Iterator[Statement]:
+def _integrals(motion: ClaimedMotion, p: Parameters, system: System) -> Identities:
     third = {
         HEAVY_TOP.name: (energy, "Omega.M/2 + P*r.gamma", "C1"),
         GYROSTAT.name: (gyrostat_energy, "Omega.M/2 + lambda*M2", "C1"),
         HEAVY_GYROSTAT.name: (energy, "Omega.(M - k)/2 + P*r.gamma", "C1"),
     }[system.name]
-    known = (gamma_squared, "|gamma|^2", "1"), (area, "M.gamma", "C0"), third
-    for component, (integral, left, right) in enumerate(known, 1):
-        text = f"{left} = {right}"
-        value = integral(p, motion.state)
-        if motion.constants is not None:
-            yield _statement("1.3", component, motion, value - motion.constants[component - 1], text)
-        elif component == 1:
-            yield _statement("1.3", component, motion, value - 1, text)
+    identities = []
+    for index, (integral, left, right) in enumerate(
+        ((gamma_squared, "|gamma|^2", "1"), (area, "M.gamma", "C0"), third)
+    ):
+        value, constants = integral(p, motion.state), motion.constants or (sympy.Integer(1),)
+        if index < len(constants):
+            identities.append((value - constants[index], f"{left} = {right}"))
         else:
-            yield _statement("1.3", component, motion, motion.rate(value), f"{left} is constant")
-
-
-def _statement(equation: str, component: int, motion: ClaimedMotion, residual: sympy.Expr, text: str) -> Statement:
-    return Statement(equation, component, motion.branch, motion.domain, residual, text, motion.formulas)
+            identities.append((motion.rate(value), f"{left} is constant"))
+    return tuple(identities)
 
 
 def why_not_equivalent() -> Sequence[ExplanationStep]:

@@ -54,7 +54,9 @@ from heavytop.features.claims.audit.statements import (
     Identities,
     Triple,
     attitude,
+    differences,
     motion_statements,
+    numbered,
     of_matrix,
     of_quaternion,
 )
@@ -187,14 +189,14 @@ class UserMotion(FileClaim):
         return replace(setting_of(self.context, self.clock.variable), parts={"smooth": parts})
 
     def statements(self, system: System) -> list[Statement]:
-        """(1.1)-(1.3), (3.1) where angles are claimed, and (3.2) where γ is claimed beside them."""
+        """(1.1)-(1.3), (3.1) where angles are claimed, and (3.2) where γ is claimed with them."""
         motion = self.motion
         if system is GYROSTAT:
             motion = replace(motion, needs=motion.needs | self.context.rotor_needs)
         statements = [*motion_statements(motion, self.context.parameters(system), system)]
         if self.table.angles is not None and self.table.gamma is not None:
-            of_angles = self.motion.attitude[:3]
-            statements += self.motion.compared("3.2", of_angles, motion.gamma, "(3.2): gamma of the angles is gamma")
+            identities = differences(motion.attitude[:3], motion.gamma, "(3.2): gamma of the angles is gamma")
+            statements += numbered("3.2", motion.branch, motion.domain, identities, self.motion.angle_formulas)
         return statements
 
     def solves(self, about: System, rows: Sequence[StatementVerdict]) -> tuple[str, ...]:
@@ -252,8 +254,7 @@ def _read_motion(table: ClaimedMotionTable, context: Context, clock: Clock) -> C
         formulas = three(table.gamma, names, "motion.gamma")
         claimed, needs = reduced(_expressions(formulas)), needs | needs_of(formulas)
         if identities:
-            pairs = zip(claimed, gamma or (), strict=True)
-            identities += tuple((ours - theirs, "gamma is the third row of R") for ours, theirs in pairs)
+            identities += differences(claimed, gamma or (), "gamma is the third row of R")
         gamma = claimed
     if table.omega is not None:
         formulas = three(table.omega, names, "motion.omega")

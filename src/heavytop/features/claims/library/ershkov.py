@@ -1,4 +1,4 @@
-"""The paper's formulas exactly as printed, with the paper's own equation numbers, beside the data they stand for.
+"""The paper's formulas exactly as printed, with the paper's equation numbers, and their data.
 
 S. V. Ershkov, "On the invariant motions of rigid body rotation over the fixed point, via Euler's angles".
 

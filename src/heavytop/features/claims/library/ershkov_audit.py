@@ -25,7 +25,9 @@ from heavytop.features.claims.audit.statements import (
     ClaimedMotion,
     attitude,
     determinant,
+    differences,
     motion_statements,
+    numbered,
     why_not_equivalent,
 )
 from heavytop.features.claims.library import ershkov, ershkov_general
@@ -187,8 +189,7 @@ class PartialClaim(_PaperClaim):
             ((2 * _I1 * c.c1 - c.c0**2) / _I1**2 - c.alpha * lam2, "(2*I1*C1 - C0^2)/I1^2 = alpha*2*P*b/C0"),
             (lam2 - c.alpha * (_I1 - _I3) / _I3, "2*P*b/C0 = alpha*(I1 - I3)/I3"),
         )
-        for component, (residual, text) in enumerate(data, 1):
-            yield Statement("4.1", component, "smooth", ALL, residual, text)
+        yield from numbered("4.1", "smooth", ALL, data)
         u = self.u(c.a, c.alpha, _T, SYMBOLIC)
         omega2 = u * u
         f1, f2 = ershkov_general.f1(general, omega2), ershkov_general.f2(general, omega2)
@@ -213,17 +214,15 @@ class PartialClaim(_PaperClaim):
         continued = ershkov.angles_smooth(c, u, SYMBOLIC)
         branches = (("smooth", ALL, continued), ("printed", BEFORE, printed), ("printed", AFTER, printed))
         for branch, domain, (phi, theta) in branches:
-            turned = gamma_from_angles(phi, theta, SYMBOLIC)
-            for component, (ours, theirs) in enumerate(zip(turned, smooth.gamma, strict=True), 1):
-                text = "(4.5) in (3.2): gamma of the angles is gamma of the smooth branch"
-                formulas = _turned_formulas((*turned, *smooth.gamma), (phi, theta))
-                yield Statement("4.5", component, branch, domain, ours - theirs, text, formulas)
+            of_angles = gamma_from_angles(phi, theta, SYMBOLIC)
+            text = "(4.5) in (3.2): gamma of the angles is gamma of the smooth branch"
+            formulas = _angle_formulas((*of_angles, *smooth.gamma), (phi, theta))
+            yield from numbered("4.5", branch, domain, differences(of_angles, smooth.gamma, text), formulas)
         final = (ershkov.phi_of_6_1(c.alpha, root, SYMBOLIC), ershkov.theta_of_6_1(c.alpha, root, SYMBOLIC))
-        turned = gamma_from_angles(*printed, SYMBOLIC)
-        formulas = _turned_formulas((*turned, *smooth.gamma), (*printed, *final))
+        of_angles = gamma_from_angles(*printed, SYMBOLIC)
+        formulas = _angle_formulas((*of_angles, *smooth.gamma), (*printed, *final))
         for domain in (BEFORE, AFTER):
-            for component, (ours, theirs) in enumerate(zip(printed, final, strict=True), 1):
-                yield Statement("6.1", component, "printed", domain, ours - theirs, "(6.1) is (4.5)", formulas)
+            yield from numbered("6.1", "printed", domain, differences(printed, final, "(6.1) is (4.5)"), formulas)
         a = ershkov.a_of_6_2(_I1, _I3, c.alpha, SYMBOLIC)
         yield Statement("6.2", 1, "smooth", ALL, a - c.a, "A of (6.2) is A of (4.1)")
 
@@ -331,8 +330,8 @@ class GeneralClaim(_PaperClaim):
             "2.4", 1, "smooth", _ANY, self.omega1_squared(c, _W) - solution[x], "(2.4) from the invariants: Omega1^2"
         )
         printed = self._motion("printed", _ANY_ROOT)
-        turned = gamma_from_angles(printed.phi, ershkov_general.theta(c, printed.omega, SYMBOLIC), SYMBOLIC)
-        for component, (ours, theirs) in enumerate(zip(turned, printed.gamma, strict=True), 1):
+        of_angles = gamma_from_angles(printed.phi, ershkov_general.theta(c, printed.omega, SYMBOLIC), SYMBOLIC)
+        for component, (ours, theirs) in enumerate(zip(of_angles, printed.gamma, strict=True), 1):
             text = "(3.3) in (3.2): gamma of the angles is gamma; arctan loses the quadrant where Omega2 < 0"
             formulas = Formulas((ours, theirs), conditions_of((ours, theirs)))
             yield Statement("3.3", component, "printed", _ANY_ROOT, ours - theirs, text, formulas)
@@ -346,8 +345,8 @@ _derivative = lru_cache(maxsize=256)(sympy.diff)
 """Branches, steps and both systems have theirs in common."""
 
 
-def _turned_formulas(gamma: tuple[sympy.Expr, ...], angles: tuple[sympy.Expr, ...]) -> Formulas:
-    """The formulas that an equation between angles rests on: that γ of the angles is continuous."""
+def _angle_formulas(gamma: tuple[sympy.Expr, ...], angles: tuple[sympy.Expr, ...]) -> Formulas:
+    """The formulas that an equation between angles rests on: γ of the angles, which is continuous."""
     return Formulas(gamma, frozenset(), (), conditions_of(angles), _POLE)
 
 
@@ -356,12 +355,12 @@ def _partial_constants() -> ershkov.Constants[Any]:
 
 
 def _parts(motion: ClaimedMotion) -> tuple[tuple[str, sympy.Expr], ...]:
-    """γ, its products and the rates: what a residual may be a constant multiple of."""
-    single = [(f"gamma{index}", part) for index, part in enumerate(motion.gamma, 1)]
-    pairs = combinations_with_replacement(single, 2)
+    """γ, its products and the rates, of which a residual may be a constant multiple."""
+    components = [(f"gamma{index}", part) for index, part in enumerate(motion.gamma, 1)]
+    pairs = combinations_with_replacement(components, 2)
     products = [(f"{name}*{other}", part * factor) for (name, part), (other, factor) in pairs]
     rates = [(f"{name}'", motion.rate(value)) for name, value in zip(VARIABLES, motion.state, strict=True)]
-    return (*single, *products, *rates)
+    return (*components, *products, *rates)
 
 
 def _sample(symbols: tuple[sympy.Symbol, ...], values: tuple[Any, ...]) -> dict[sympy.Symbol, Fraction]:
