@@ -217,7 +217,7 @@ def test_the_bound_of_a_step_holds_at_every_corner_of_its_set_of_errors(size, pr
     node = start_node(scaled.field, scaled.scaled.state, of_motion)
     radius = round(size * 2.0 ** (of_motion - precision))
     node = replace(node, errors=replace(node.errors, radii=np.full(6, float(radius))))
-    found = step(scaled.field, node, of_motion, scaled.certified_at(of_motion))
+    found = step(scaled.field, node, of_motion, scaled.certified(of_motion))
     along = in_other_bits(scaled.field, found, precision, tangent.certified)
     assert (along is found) == (of_motion == precision)
     box = [
