@@ -101,38 +101,38 @@ class ConventionSearch(Search):
         self.times, self.states = self.samples.times, len(samples.times)
         first = FIRST[-1] + (not self.times[0])
         self.early = self.samples.at(list(range(min(len(self.times), first))))
-        self.own = self.errors_if(self.samples)
+        self.file_errors = self.errors_if(self.samples)
 
     def hypotheses(self) -> Iterator[Hypothesis]:
         """All hypotheses, the simplest first, those with a fitted number last; none if every sample is out of reach."""
         return map(self._tried, _hypotheses(self) if self.reaches else ())
 
-    def further(self, diagnosis: Diagnosis | None, own: float) -> Iterator[Hypothesis]:
+    def further(self, diagnosis: Diagnosis | None, error: float) -> Iterator[Hypothesis]:
         """Hypotheses of two readings at once."""
-        if self.reaches and diagnosis is None and own > _TWO_MISTAKES and _forms(self.samples) & set(FORMS):
+        if self.reaches and diagnosis is None and error > _TWO_MISTAKES and _forms(self.samples) & set(FORMS):
             yield from map(self._tried, _pairs(self.samples))
 
     def of_start(self) -> Diagnosis | None:
         """Another start, tried last: its six numbers also fit a motion that is only early or late."""
-        own = float(self.own.max())
-        if not self.reaches or not WORTH_ASKING < own < numpy.inf or len(self.own) < _FEWEST:
+        error = float(self.file_errors.max())
+        if not self.reaches or not WORTH_ASKING < error < numpy.inf or len(self.file_errors) < _FEWEST:
             return None
-        return self.best([*map(self._tried, _start(self))], own)
+        return self.best([*map(self._tried, _start(self))], error)
 
     def of_rates(self) -> Diagnosis | None:
         """The simplest reading of the columns in which Ω is the rate of the attitude; no motion is computed."""
         samples = self.every.at(list(range(min(_NEIGHBOURS, len(self.every.times)))))
         off = rates_off(samples, samples.said)
-        if off is None or not _CONTRADICTS < (own := float(off.max())) < numpy.inf:
+        if off is None or not _CONTRADICTS < (error := float(off.max())) < numpy.inf:
             return None
         readings = [(name, numbers, rates_off(samples, reading)) for name, numbers, reading in _readings(samples)]
         left, kind, numbers = min(
             ((float(off.max()), kind, numbers) for kind, numbers, off in readings if off is not None),
             key=lambda entry: entry[0],
-            default=(own, "", {}),
+            default=(error, "", {}),
         )
         looked = scope(samples.times, self.states)
-        return Diagnosis(kind, {**numbers, "of": RATES}, own, left, looked) if left * DROP <= own else None
+        return Diagnosis(kind, {**numbers, "of": RATES}, error, left, looked) if left * DROP <= error else None
 
     @cached_property
     def refused(self) -> float:
@@ -141,7 +141,7 @@ class ConventionSearch(Search):
             [v for name, v in part.columns.items() if name.startswith("omega")] for part in (self.early, self.samples)
         ]
         early, largest = (max((float(numpy.abs(values).max()) for values in part), default=1.0) for part in rates)
-        return refused(early, largest, float(self.own.max()))
+        return refused(early, largest, float(self.file_errors.max()))
 
     def _tried(self, row: Row) -> Hypothesis:
         """The hypothesis; later errors are infinite where those of the first samples refute a motion."""
@@ -150,7 +150,7 @@ class ConventionSearch(Search):
         supposed = {name: value for name, value in supposed.items() if name not in judged}
         left = self.errors_if(self.early, **supposed)
         if supposed.keys() & {"start", "body", "shift", "begin"} and not float(left.max()) <= self.refused:
-            left = numpy.append(left, numpy.full(len(self.own) - len(left), numpy.inf))
+            left = numpy.append(left, numpy.full(len(self.file_errors) - len(left), numpy.inf))
         else:
             left = self.errors_if(self.samples, **supposed)
         return Hypothesis(kind, {"of": DATA, **numbers}, left, **judged)
@@ -300,7 +300,7 @@ def _start(search: ConventionSearch) -> Iterator[Row]:
     if _SAME < (off := float(numpy.abs(x).max())) < numpy.inf:
         supposed = start_of(x)
         numbers = {"angle": _angle(_turn(x[:3])), "omega": _list(supposed["begin"].omega)}
-        yield "start", numbers, {**supposed, "drop": _START_DROP * max(1.0, float(search.own.max()) / off)}
+        yield "start", numbers, {**supposed, "drop": _START_DROP * max(1.0, float(search.file_errors.max()) / off)}
 
 
 def _scalable(body: BodyData) -> Iterator[tuple[str, dict[str, str], str, Any]]:
@@ -546,8 +546,8 @@ def _fitted(samples: Observations, simulated: SimulatedMotion) -> Iterator[Row]:
         yield from _near("position_unit", float((positions * true).sum()) / size, said, "scale")
     offset = (positions - true).mean(axis=0)
     yield "pivot", {"offset": _list(offset)}, {"columns": replace(said, offset=tuple(offset)), **_FITTED}
-    own = numpy.einsum("nji,nj->ni", simulated.rotation, positions).mean(axis=0)
-    yield "point", {"point": _list(own)}, {"columns": replace(said, point=tuple(own)), **_FITTED}
+    in_body = numpy.einsum("nji,nj->ni", simulated.rotation, positions).mean(axis=0)
+    yield "point", {"point": _list(in_body)}, {"columns": replace(said, point=tuple(in_body)), **_FITTED}
     design = numpy.concatenate([simulated.rotation, numpy.tile(numpy.eye(3), (len(positions), 1, 1))], axis=2)
     if len(positions) >= _FEWEST and numpy.isfinite(design).all() and numpy.isfinite(positions).all():
         both = numpy.linalg.lstsq(design.reshape(-1, 6), positions.reshape(-1), rcond=None)[0]

@@ -154,8 +154,8 @@ class StateSearch(Search):
 
     def __init__(self, examined: Examined) -> None:
         self.truth = examined.simulated(examined.times)
-        self.own = examined.errors(self.truth)
-        self.examined = examined.refusing(float(self.own.max()))
+        self.file_errors = examined.errors(self.truth)
+        self.examined = examined.refusing(float(self.file_errors.max()))
         self.times, self.states = examined.given_times, len(examined.all_times)
 
     def hypotheses(self) -> Iterator[Hypothesis]:
@@ -177,9 +177,9 @@ class StateSearch(Search):
         ):
             yield from fitted(examined)
 
-    def further(self, diagnosis: Diagnosis | None, own: float) -> Iterator[Hypothesis]:
+    def further(self, diagnosis: Diagnosis | None, error: float) -> Iterator[Hypothesis]:
         """Other equations; a sign in those of a symmetric body is another top as well."""
-        if (diagnosis is None or diagnosis.kind == "top") and own > _WRONG and self.truth is not None:
+        if (diagnosis is None or diagnosis.kind == "top") and error > _WRONG and self.truth is not None:
             yield from hypotheses.of_equations(self.examined, self.truth)
 
 
@@ -195,14 +195,16 @@ def _reset(examined: Examined | None) -> Diagnosis | None:
     times = numpy.array([float(time) for time in every.times])
     grid = numpy.linspace(0, numpy.diff(times).max() if times[0] >= 0 else numpy.diff(times).min(), _GRID)
     truth = every.simulated(every.times)
-    own = None if truth is None else every.errors(truth)
-    orbit = every.simulated([Fraction(value) for value in grid]) if own is not None and own.max() > _JUMPS else None
-    if orbit is None or own is None:
+    errors = every.errors(truth)
+    orbit = (
+        every.simulated([Fraction(value) for value in grid]) if truth is not None and errors.max() > _JUMPS else None
+    )
+    if orbit is None:
         return None
     sizes = numpy.repeat([every.rate, 1.0], [3, orbit.shape[1] - 3])
     near = numpy.array([numpy.abs((orbit - state) / sizes).max(axis=1).min() for state in every.states])
     first = 2 if times[0] == 0 else 1
-    back = numpy.flatnonzero((near[first:-2] <= _BACK) & (own[first:-2] > _JUMPS)) + first
+    back = numpy.flatnonzero((near[first:-2] <= _BACK) & (errors[first:-2] > _JUMPS)) + first
     for row in map(int, back):
         rows = range(row, min(row + _FOLLOWED, len(times)))
         nearest = int(numpy.abs((orbit - every.states[row]) / sizes).max(axis=1).argmin())
@@ -210,7 +212,7 @@ def _reset(examined: Examined | None) -> Diagnosis | None:
         again = every.at([every.rows[n] for n in rows])
         moved = again.simulated([time - every.times[row] + Fraction(grid[nearest]) for time in again.times])
         jumps = expected is not None and _apart(every, every.states[row], expected) > _JUMPS
-        left, error = float(again.errors(moved).max()), float(own[rows].max())
+        left, error = float(again.errors(moved).max()), float(errors[rows].max())
         if jumps and left * _AGAIN <= error:
             return Diagnosis("reset", {"t": in_units(times[row], every.units.time)}, error, left)
     return None
@@ -305,16 +307,16 @@ def _lost_row(every: Examined) -> Diagnosis | None:
     truth = every.simulated(times)
     if truth is None:
         return None
-    own = every.errors(truth)
+    errors = every.errors(truth)
     for kind, moved_truth in readings:
         if moved_truth is None:
             continue
         moved = every.errors(moved_truth)
-        left = [max(own[:row].max(), moved[row:].max()) for row in range(1, len(times) - 1)]
+        left = [max(errors[:row].max(), moved[row:].max()) for row in range(1, len(times) - 1)]
         row = int(numpy.argmin(left))
-        if left[row] * _ALONE <= own.max():
+        if left[row] * _ALONE <= errors.max():
             return Diagnosis(
-                kind, {"t": in_units(times[row + 1], every.units.time)}, float(own.max()), float(left[row])
+                kind, {"t": in_units(times[row + 1], every.units.time)}, float(errors.max()), float(left[row])
             )
     return None
 

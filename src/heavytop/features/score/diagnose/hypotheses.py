@@ -199,9 +199,9 @@ def without_numbers(run: Examined) -> Iterator[Hypothesis]:
     if any(k):
         turned = HeavyTop(top.inertia, top.weight, top.centre, [-part for part in k])
         yield Hypothesis("rotor_sign", {}, replace(run, top=turned).motion_errors())
-    own = run.tensor, run.in_file(top.centre), run.in_file(k)
-    for kind, numbers, *body in other_axes(*own):
-        if not all(map(numpy.array_equal, body, own)):
+    unchanged = run.tensor, run.in_file(top.centre), run.in_file(k)
+    for kind, numbers, *body in other_axes(*unchanged):
+        if not all(map(numpy.array_equal, body, unchanged)):
             supposed = run.with_body(body[0], float(top.weight) * body[1], body[2])
             yield Hypothesis(kind, numbers, supposed.motion_errors())
 

@@ -221,10 +221,10 @@ class Examined:
         errors: Array = numpy.fmax(of_omega / omega, of_gamma / gamma)
         return numpy.nan_to_num(errors, nan=numpy.inf, posinf=numpy.inf)
 
-    def refusing(self, own: float) -> Examined:
-        """This motion, whose error is ``own``, with the error of its first samples that refutes a hypothesis."""
+    def refusing(self, error: float) -> Examined:
+        """This motion, whose error is ``error``, with the error of its first samples that refutes a hypothesis."""
         omega = numpy.nan_to_num(numpy.abs(self.states[:, :3]), nan=1.0)
-        return replace(self, refused=refused(float(omega[: self._first].max()), float(omega.max()), own))
+        return replace(self, refused=refused(float(omega[: self._first].max()), float(omega.max()), error))
 
     @property
     def _first(self) -> int:
@@ -242,13 +242,13 @@ class Examined:
         return self.errors(self.simulated(times))
 
 
-def refused(early: float, largest: float, own: float) -> float:
+def refused(early: float, largest: float, error: float) -> float:
     """The error of the first samples beyond which a motion is refuted, also relative to the largest Ω.
 
-    early, largest: |Ω| of the first samples and of all.  own: the error of the file as it stands.
+    early, largest: |Ω| of the first samples and of all.  error: the error of the file as it stands.
     """
     growth = _ANISOTROPY * largest / early if early else numpy.inf
-    return float(growth * (own if numpy.isfinite(own) else 1.0) / LIKELY_DROP)
+    return float(growth * (error if numpy.isfinite(error) else 1.0) / LIKELY_DROP)
 
 
 def examined(

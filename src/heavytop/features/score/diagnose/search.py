@@ -92,11 +92,11 @@ class Hypothesis(NamedTuple):
 class Search:
     """The search for the mistake of a file.
 
-    own: the error of each sample compared, as the file stands.  times: of these, in units of the file.
+    file_errors: of each sample compared, as the file stands.  times: of these, in units of the file.
     states: how many the file has.  names_others: whether a diagnosis names hypotheses that fit as well.
     """
 
-    own: Array
+    file_errors: Array
     times: Sequence[Fraction]
     states: int
     names_others = False
@@ -105,7 +105,7 @@ class Search:
         """The simplest first, those with a fitted number last."""
         raise NotImplementedError
 
-    def further(self, diagnosis: Diagnosis | None, own: float) -> Iterator[Hypothesis]:
+    def further(self, diagnosis: Diagnosis | None, error: float) -> Iterator[Hypothesis]:
         """Hypotheses that are tried only where nothing, or nothing better than this, explains the error."""
         raise NotImplementedError
 
@@ -119,28 +119,28 @@ class Search:
 
         first: of the first samples alone, where no number is fitted.  drop: a smaller one than usual.
         """
-        looked = len(self.own) if first is None else first + (not self.times[0])
-        if looked > len(self.own):
+        looked = len(self.file_errors) if first is None else first + (not self.times[0])
+        if looked > len(self.file_errors):
             return None
-        own = float(self.own[:looked].max())
-        own = own if numpy.isfinite(own) else 1.0
-        if not own > WORTH_ASKING:
+        error = float(self.file_errors[:looked].max())
+        error = error if numpy.isfinite(error) else 1.0
+        if not error > WORTH_ASKING:
             return None
         plain = (hypothesis for hypothesis in self.tried if hypothesis.drop == DROP)
-        of_all = (hypothesis for hypothesis in plain if len(hypothesis.errors) == len(self.own))
+        of_all = (hypothesis for hypothesis in plain if len(hypothesis.errors) == len(self.file_errors))
         tried = self.tried if first is None else [*of_all]
-        diagnosis = self.best(tried, own, looked, drop)
-        further = [*self.further(diagnosis, own)] if first is None and not drop else []
-        return self.best([*further, *tried], own, looked) if further else diagnosis
+        diagnosis = self.best(tried, error, looked, drop)
+        further = [*self.further(diagnosis, error)] if first is None and not drop else []
+        return self.best([*further, *tried], error, looked) if further else diagnosis
 
     def best(
-        self, tried: Sequence[Hypothesis], own: float, looked: int | None = None, drop: float = 0.0
+        self, tried: Sequence[Hypothesis], error: float, looked: int | None = None, drop: float = 0.0
     ) -> Diagnosis | None:
         """The simplest of these hypotheses that explains the error of the first so many samples."""
-        looked = len(self.own) if looked is None else looked
+        looked = len(self.file_errors) if looked is None else looked
         lefts = [(hypothesis, hypothesis.left(looked)) for hypothesis in tried]
         lefts = [pair for pair in lefts if pair[1] <= _NOTHING]
-        explained = [(hypothesis, left) for hypothesis, left in lefts if left * hypothesis.least_fall(drop) <= own]
+        explained = [(hypothesis, left) for hypothesis, left in lefts if left * hypothesis.least_fall(drop) <= error]
         if not explained:
             return None
         best = min(max(left, FLOOR) for _, left in explained)
@@ -155,7 +155,7 @@ class Search:
             others = [Diagnosis(kind, _of_kind(kind, equal)[0].numbers) for kind in kinds]
             numbers = first.numbers | ({"or": ", ".join(kinds)} if kinds else {})
         return Diagnosis(
-            first.kind, numbers, own, left, scope(self.times[:looked], self.states), bool(drop), (*others,)
+            first.kind, numbers, error, left, scope(self.times[:looked], self.states), bool(drop), (*others,)
         )
 
 
