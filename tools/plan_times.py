@@ -1,4 +1,5 @@
-"""Where does the processor time of a plan go: compiling, integrating, the truth, scoring, rounding noise, the rest?
+"""Where does the processor time of a plan go: compiling, integrating (runs and their reruns), the truth, scoring, what
+else the rounding noise takes, the rest?  The last line is the share of integrating once everything is compiled.
 
 Run: python tools/plan_times.py [PLAN]     (default; one process, processor seconds, by kind and row)
 """
@@ -32,8 +33,6 @@ PARTS = {
     "scoring": ("measure.scorer:Scorer.__call__", "measure.scorer:Drift.flush", "measure.scorer:flush_together"),
     "noise": ("measure.rounding_noise:Reruns._of",),
 }
-WHOLE = ("noise",)
-"""Parts of which everything inside counts as that part."""
 
 
 class Clock:
@@ -53,7 +52,7 @@ class Clock:
         @wraps(function)
         def call(*arguments: Any, **named: Any) -> Any:
             self.switch()
-            self.stack.append(self.stack[-1] if self.stack[-1] in WHOLE else part)
+            self.stack.append(part)
             try:
                 return function(*arguments, **named)
             finally:
@@ -100,6 +99,7 @@ def main() -> None:
     for kind, spent in [*kinds.items(), ("all", whole)]:
         parts = "  ".join(f"{part} {seconds:.1f}" for part, seconds in spent.most_common())
         print(f"{sum(spent.values()):7.1f}  {kind:20} {parts}")
+    print(f"integrating: {whole['integrating'] / (whole.total() - whole['compiling']):.1%}")
 
 
 if __name__ == "__main__":
