@@ -9,7 +9,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from threading import Event, Thread, Timer
+from threading import Timer
 from time import perf_counter
 from typing import Any, Self, TextIO
 
@@ -26,11 +26,11 @@ class OutputError(HeavyTopError):
 
 
 class ReaderGone(Exception):
-    """The program that read standard output ended, as `head` does; no error, and no more output."""
+    """The program that reads standard output has ended, as `head` does: no error, and no more output."""
 
 
 class _Output(io.FileIO):
-    """Standard output, whose failures are not confused with those of files, by us or by any library in between."""
+    """Standard output, whose failures are distinguished from those of files."""
 
     def write(self, data: Any) -> int:
         try:
@@ -43,7 +43,7 @@ class _Output(io.FileIO):
 
 
 class _Messages(io.FileIO):
-    """Standard error: what cannot be said is dropped, and changes nothing else."""
+    """Standard error: messages that cannot be written are dropped, with no other effect."""
 
     def write(self, data: Any) -> int:
         try:
@@ -85,14 +85,14 @@ def _stream(raw: io.FileIO, before: Any, errors: str) -> io.TextIOWrapper:
 
 
 def drop_output() -> None:
-    """Let what is still to be written go nowhere, so that the end of the process does not try once more."""
+    """Discard what is still buffered, so that the end of the process does not try to write it again."""
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 1)
     os.close(null)
 
 
 def messages() -> TextIO:
-    """Where the program itself speaks to people: standard error, also while a third-party integrator is silenced."""
+    """The stream of messages to people: standard error, also while a third-party integrator is silenced."""
     return _own or sys.stderr
 
 
@@ -102,14 +102,14 @@ def say(text: str) -> None:
 
 
 def say_former(names: Iterable[str]) -> None:
-    """A line for each name among these that an integrator had before."""
+    """Print a note for each former name of an integrator among these."""
     for name in sorted(set(names)):
         if text := records.notice(name):
             say(f"note: {text}")
 
 
 def printable(document: str) -> str:
-    """A JSON document in characters that standard output has: what its encoding lacks is escaped, and nothing lost."""
+    """A JSON document in the encoding of standard output: characters that it lacks are escaped."""
     try:
         document.encode(sys.stdout.encoding or "utf-8")
     except UnicodeEncodeError:
@@ -125,13 +125,13 @@ def printable(document: str) -> str:
 _TRUST, _MEASURED = 0.05, 0.1
 """The expected speed counts at first as much as a twentieth of the work, and no more when a tenth of it is done."""
 _EVEN = 1e-12
-"""The same of work that goes on evenly, whose speed shows at once."""
+"""The trust of work that proceeds evenly, whose speed shows at once."""
 _EVERY = 0.5
-"""Seconds between two looks at work that does not report by itself."""
+"""Seconds between two drawings of a bar."""
 SILENCE = 10.0
-"""Seconds after which a command says what it is at."""
+"""Seconds after which a command says what it is doing."""
 _open: list[Bar] = []
-"""The bars of what is being done in this process, the innermost last."""
+"""The bars of the work under way in this process, the innermost last."""
 
 
 class Estimator:
@@ -180,12 +180,12 @@ class Estimator:
 
 
 def duration(seconds: float) -> str:
-    """A time to wait, as short as people say it: 8 s, 1:05, 2:03:00."""
-    whole = math.ceil(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    hours, rest = divmod(whole, 3600)
-    return f"{hours}:{rest // 60:02}:{rest % 60:02}" if hours else f"{rest // 60}:{rest % 60:02}"
+    """A time to wait in short: 8 s, 1:05, 2:03:00."""
+    minutes, seconds = divmod(math.ceil(seconds), 60)
+    if not minutes:
+        return f"{seconds} s"
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"
 
 
 @contextmanager
@@ -213,30 +213,37 @@ def told_when_slow(command: str) -> Iterator[None]:
 
 
 class Bar:
-    """A line on a terminal that is drawn again and again: parts done, of how many, per cent, time left.
+    """A line that a terminal draws twice a second: parts done, of how many, per cent, time left.
 
-    count: how many parts there are, named by ``unit``; 0 where they are not counted.  label: what is being done.
+    count: how many parts there are, named by ``unit``; 0 where they are not counted.  label: the work under way.
     """
 
-    label = ""
     look: Callable[[], None] | None = None
-    """Called before its state is read, where the work does not report by itself."""
+    """Called before the state is read, for work that does not report by itself."""
 
-    def __init__(self, estimator: Estimator, count: int = 0, unit: str = "rows", console: Any = None) -> None:
+    def __init__(
+        self, estimator: Estimator, count: int = 0, unit: str = "rows", label: str = "", console: Any = None
+    ) -> None:
         from rich.console import Console
+        from rich.live import Live
 
-        self.estimator, self.count, self.unit, self.finished = estimator, count, unit, 0
+        self.estimator, self.count, self.unit, self.label, self.finished = estimator, count, unit, label, 0
         self.console = console or Console(file=messages())
         self.live = bool(self.console.is_terminal)
-        self.bar = self._drawn() if self.live else None
+        self._drawing = Live(
+            console=self.console, get_renderable=self._drawn, refresh_per_second=1 / _EVERY, transient=True
+        )
 
     def _drawn(self) -> Any:
-        from rich.progress import BarColumn, Progress, TextColumn
+        from rich.progress_bar import ProgressBar
+        from rich.table import Column, Table
+        from rich.text import Text
 
-        columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[said]}")
-        bar = Progress(*columns, console=self.console, transient=True)
-        self.id = bar.add_task("starting", total=1.0, said=self.said())
-        return bar
+        self.state()
+        line = Table.grid(Column(no_wrap=True), Column(), Column(no_wrap=True), padding=(0, 1))
+        fraction = ProgressBar(1.0, self.estimator.fraction, width=40)
+        line.add_row(Text(self.label[:40] or "starting"), fraction, Text(self.said()))
+        return line
 
     def said(self) -> str:
         """Parts done of all, per cent, time left."""
@@ -254,23 +261,15 @@ class Bar:
             self.look()
         return ": ".join(filter(None, (self.label, self.said())))
 
-    def show(self, label: str | None = None) -> None:
-        """Draw it as it is now."""
-        self.label = self.label if label is None else label
-        named = None if label is None else label[:40]
-        if self.bar is not None:
-            self.bar.update(self.id, completed=self.estimator.fraction, description=named, said=self.said())
-
     def __enter__(self) -> Self:
-        if self.bar is not None:
-            self.bar.start()
+        if self.live:
+            self._drawing.start(refresh=True)
         _open.append(self)
         return self
 
     def __exit__(self, *_: object) -> None:
         _open.remove(self)
-        if self.bar is not None:
-            self.bar.stop()
+        self._drawing.stop()
 
 
 class Progress(Bar):
@@ -284,13 +283,12 @@ class Progress(Bar):
         super().__init__(Estimator(sum(map(self._cost, tasks)), 1 / max(workers, 1)), len(tasks))
 
     def begin(self, task: Any) -> None:
-        """Names the task that is running."""
-        self.show(task.label)
+        """Name the task that is running."""
+        self.label = task.label
 
     def __call__(self, task: Any) -> None:
         self.finished += 1
         self.estimator.advance(self._cost(task))
-        self.show()
 
     def _cost(self, task: Any) -> float:
         cost: float = self.kinds[task.key.kind].cost(task)
@@ -299,11 +297,10 @@ class Progress(Bar):
 
 @contextmanager
 def counted(label: str, count: int, unit: str, expected: float) -> Iterator[Callable[[], None]]:
-    """A bar over ``count`` parts of equal weight; gives what to call after each.  expected: seconds of one."""
-    with Bar(Estimator(count, expected), count, unit) as bar, _watched(bar, label):
+    """A bar over ``count`` parts of equal weight; yields a function to call after each.  expected: seconds of one."""
+    with Bar(Estimator(count, expected), count, unit, label) as bar:
 
         def advance() -> None:
-            # drawn by the thread that looks twice a second: there may be very many parts
             bar.finished += 1
             bar.estimator.advance(1)
 
@@ -312,27 +309,26 @@ def counted(label: str, count: int, unit: str, expected: float) -> Iterator[Call
 
 @contextmanager
 def followed(label: str, unit: str, expected: float) -> Iterator[Callable[[int, int], None]]:
-    """A bar over parts whose number is found on the way; gives what to call with how many are done, of how many."""
-    with Bar(Estimator(1.0, expected), 0, unit) as bar, _watched(bar, label):
+    """A bar over parts whose number is found on the way; yields a function of how many are done, of how many."""
+    with Bar(Estimator(1.0, expected), 0, unit, label) as bar:
 
         def advance(done: int, of: int) -> None:
             bar.finished, bar.count = done, of
             bar.estimator.reach(done / of)
-            bar.show(label)
 
         yield advance
 
 
 @contextmanager
 def reaching(label: str, expected: float) -> Iterator[Callable[[float], None]]:
-    """A bar over work that goes on evenly; gives what to call with the part of it that is done."""
-    with Bar(Estimator(1.0, expected, trust=_EVEN)) as bar, _watched(bar, label):
+    """A bar over work that proceeds evenly; yields a function of the fraction that is done."""
+    with Bar(Estimator(1.0, expected, trust=_EVEN), label=label) as bar:
         yield bar.estimator.reach
 
 
 @contextmanager
 def waiting(label: str, most: float) -> Iterator[None]:
-    """A bar while something works that cannot say how far it is, and is stopped after ``most`` seconds: of these."""
+    """A bar over work that cannot report and is stopped after ``most`` seconds: the fraction of these that is over."""
     began = perf_counter()
     with watched(f"{label}, {duration(most)} at most", lambda: (perf_counter() - began) / most, most):
         yield
@@ -340,31 +336,7 @@ def waiting(label: str, most: float) -> Iterator[None]:
 
 @contextmanager
 def watched(label: str, fraction: Callable[[], float], expected: float) -> Iterator[None]:
-    """A bar over work that does not report: ``fraction`` is asked how much of it is done, from another thread."""
-    with Bar(Estimator(1.0, expected)) as bar:
+    """A bar over work that does not report: ``fraction`` is called for the part done, from another thread."""
+    with Bar(Estimator(1.0, expected), label=label) as bar:
         bar.look = lambda: bar.estimator.reach(fraction())
-        with _watched(bar, label):
-            yield
-
-
-@contextmanager
-def _watched(bar: Bar, label: str) -> Iterator[None]:
-    """Draw the bar twice a second, on a terminal."""
-    bar.label = label
-    if not bar.live:
         yield
-        return
-    stop = Event()
-
-    def draw() -> None:
-        while not stop.wait(_EVERY):
-            bar.state()
-            bar.show(label)
-
-    thread = Thread(target=draw, daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        stop.set()
-        thread.join()
