@@ -15,7 +15,7 @@ from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 @pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, QUAD, real(237)], ids=lambda p: p.name)
 def test_compile(benchmark, system, precision) -> None:
     def forget() -> None:
-        engines._compiled.clear()
+        engines.build.results.clear()
         heyoka.llvm_state.clear_memcache()
 
     tool = benchmark.pedantic(lambda: engines.compiled(system, precision), setup=forget, rounds=3)

@@ -18,7 +18,8 @@ from itertools import islice
 from math import isqrt
 from numbers import Rational
 from operator import index, is_
-from typing import TYPE_CHECKING, Any, Protocol, Self, SupportsIndex, TypeAlias, TypeVar, cast
+from threading import RLock
+from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, SupportsIndex, TypeAlias, TypeVar, cast
 
 from heavytop.errors import HeavyTopError, InputError, argument, quoted
 from heavytop.extras import import_heyoka
@@ -476,31 +477,50 @@ def native_text(value: Any, precision: Precision) -> str:
     return decimal_text(exact(value), precision.digits)
 
 
-# What a function gave for the last arguments, kept for those who ask again with the very same objects.
+# Cached results of functions.
 
 
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 
 
-def cache_last_call(function: Callable[..., Found]) -> Callable[..., Found]:
-    """``function`` of positional arguments that do not change, called again only where one is another object.
+def cache_last_call(function: Callable[..., Result]) -> Callable[..., Result]:
+    """``function`` of immutable positional arguments, called again only where one of them is another object.
 
-    An exception is not kept.  Threads may call it: at worst each computes for itself.
+    An exception is not cached.  Threads may call it: at worst each computes for itself.
     """
-    kept: tuple[tuple[Any, ...], Any] | None = None
+    cached: tuple[tuple[Any, ...], Any] | None = None
 
     @wraps(function)
-    def look_up(*arguments: Any) -> Found:
-        nonlocal kept
-        before = kept
-        if before is not None and len(before[0]) == len(arguments) and all(map(is_, before[0], arguments)):
-            value: Found = before[1]
+    def look_up(*arguments: Any) -> Result:
+        nonlocal cached
+        last = cached
+        if last is not None and len(last[0]) == len(arguments) and all(map(is_, last[0], arguments)):
+            value: Result = last[1]
             return value
         value = function(*arguments)
-        kept = arguments, value
+        cached = arguments, value
         return value
 
     return look_up
+
+
+class OncePerArguments(Generic[Result]):
+    """A function that is called once for equal arguments: a thread waits for the result that another computes.
+
+    results: by the arguments.  An exception is not cached.
+    """
+
+    def __init__(self, function: Callable[..., Result]) -> None:
+        self.function = function
+        self.results: dict[tuple[Any, ...], Result] = {}
+        self._locks: dict[tuple[Any, ...], RLock] = {}
+
+    def __call__(self, *arguments: Any) -> Result:
+        if arguments not in self.results:
+            with self._locks.setdefault(arguments, RLock()):
+                if arguments not in self.results:
+                    self.results[arguments] = self.function(*arguments)
+        return self.results[arguments]
 
 
 # Vectors of three exact numbers, and their products over any ring.

@@ -31,7 +31,7 @@ def test_the_known_derivatives_are_those_of_the_enclosed_motion() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda system: system.name)
 def test_every_kind_of_integrator_passes_and_is_at_time_0_again(system, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engines, "_compiled", {})
+    monkeypatch.setattr(engines.build, "results", {})
     for precision in (EXTENDED, QUAD, real(24)) if system is HEAVY_TOP else (QUAD,):
         engine = compiled(system, precision, attitude=True).engine
         assert engine.time == 0
@@ -95,10 +95,10 @@ def test_a_wrong_field_is_refused_before_its_first_use(monkeypatch: pytest.Monke
         return [(first, rate * (1 + 1e-13)), *rest]
 
     monkeypatch.setattr(engines, "expressions", biased)
-    monkeypatch.setattr(engines, "_compiled", {})
+    monkeypatch.setattr(engines.build, "results", {})
     with pytest.raises(Contradiction, match="Taylor coefficient 1"):
         compiled(HEAVY_TOP, DOUBLE)
-    assert not engines._compiled
+    assert not engines.build.results
 
 
 @pytest.mark.slow

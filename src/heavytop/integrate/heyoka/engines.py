@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache
 from math import comb, exp, factorial, log
-from threading import Lock, RLock
+from threading import Lock
 from time import perf_counter
 from typing import Any
 
@@ -21,6 +21,7 @@ from heavytop.integrate.trajectory import Problem
 from heavytop.precision import (
     DOUBLE,
     DOUBLE_DOUBLE,
+    OncePerArguments,
     Precision,
     cache_last_call,
     exact,
@@ -218,11 +219,6 @@ class Compiled:
                 return deepcopy(self.engine)
 
 
-_compiled: dict[tuple[Any, ...], Compiled] = {}
-_compiling: dict[tuple[Any, ...], RLock] = {}
-"""A lock for each key: what one thread compiles, another that needs the same waits for."""
-
-
 @cache
 def not_finite() -> Any:
     """The outcome of a step to a state that is not finite."""
@@ -271,25 +267,11 @@ def compiled(
     Raises Contradiction where its first step, which is known, is wrong.
     """
     compact = precision.family in ("quad", "real") if compact_mode is None else compact_mode
-    settings = precision, attitude, tolerance, high_accuracy, compact, lanes, constants
-    key = (system.name, *settings)
-    machine = _compiled.get(key)
-    if machine is not None:
-        return machine
-    require(precision)
-    if precision == DOUBLE_DOUBLE:
-        raise InputError("heyoka has no double-double.", "Use the integrator multiword for it, or quad.")
-    if constants is not None and precision != DOUBLE:
-        raise InputError(f"Constants cannot be compiled in for {precision.name}.", "Use double.")
-    with _compiling.setdefault(key, RLock()):
-        if key not in _compiled:
-            engine, seconds = _built(system, *settings)
-            check(engine, system, precision, constants)
-            _compiled[key] = Compiled(engine, seconds, _flags(engine))
-    return _compiled[key]
+    return build(system, precision, attitude, tolerance, high_accuracy, compact, lanes, constants)
 
 
-def _built(
+@OncePerArguments
+def build(
     system: System,
     precision: Precision,
     attitude: bool,
@@ -298,30 +280,32 @@ def _built(
     compact: bool,
     lanes: int | None,
     constants: Parameters | None,
-) -> tuple[Any, float]:
-    """A new engine, and the seconds that compiling it took."""
+) -> Compiled:
+    """A new integrator, checked; the arguments: as in :func:`compiled`."""
+    require(precision)
+    if precision == DOUBLE_DOUBLE:
+        raise InputError("heyoka has no double-double.", "Use the integrator multiword for it, or quad.")
+    if constants is not None and precision != DOUBLE:
+        raise InputError(f"Constants cannot be compiled in for {precision.name}.", "Use double.")
     heyoka = import_heyoka()
 
     # a cache of machine code on disk is not protected against corruption: a flipped bit gives wrong numbers silently
     heyoka.llvm_state.set_diskcache_enabled(False)
     one, zero = number(Fraction(1), precision), number(Fraction(0), precision)
-    size = 9 if attitude else 6
     options: dict[str, Any] = {"compact_mode": compact, "high_accuracy": high_accuracy}
     if tolerance is not None:
         options["tol"] = number(usable_tolerance(tolerance, precision), precision)
     if precision.family == "real":
         options["prec"] = precision.bits
-    build, shape = (heyoka.taylor_adaptive, ()) if lanes is None else (heyoka.taylor_adaptive_batch, (lanes,))
+    make, shape = (heyoka.taylor_adaptive, ()) if lanes is None else (heyoka.taylor_adaptive_batch, (lanes,))
     if constants is None:
         options["pars"] = numpy.full((_count(system), *shape), one)
-    before = perf_counter()
-    engine = build(
-        expressions(system, attitude, constants and constants.mapped(float)),
-        numpy.full((size, *shape), zero),
-        fp_type=type(one),
-        **options,
-    )
-    return engine, perf_counter() - before
+    field, start = expressions(system, attitude, constants and constants.mapped(float)), (9 if attitude else 6, *shape)
+    began = perf_counter()
+    engine = make(field, numpy.full(start, zero), fp_type=type(one), **options)
+    seconds = perf_counter() - began
+    check(engine, system, precision, constants)
+    return Compiled(engine, seconds, _flags(engine))
 
 
 def _count(system: System) -> int:

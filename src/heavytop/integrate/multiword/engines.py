@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 from math import ceil, factorial
-from threading import Lock
-from typing import Any
 
 from heavytop.errors import Contradiction, InputError
 from heavytop.integrate.heyoka.engines import GAMMA, OMEGA, XI, derivatives, known_parameters
@@ -21,10 +18,10 @@ from heavytop.multiword.fixed_point.arithmetic import Grid, grid_for
 from heavytop.multiword.fixed_point.fixed_point_run import Fixed
 from heavytop.multiword.integers.integer_series import IntegerMotion
 from heavytop.multiword.problem import ResumableRun, Scaled, Status, Steps
-from heavytop.precision import DOUBLE, Precision, cache_last_call, decimal_text
+from heavytop.precision import DOUBLE, OncePerArguments, Precision, cache_last_call, decimal_text
 from heavytop.top.equations import System
 
-# Machine code takes one known step before it takes any other.
+# A step that is known, which machine code takes before any other.
 
 
 _MOST_ORDERS = 100
@@ -34,7 +31,7 @@ _LATER = Fraction(7, 11)
 def check(system: System, attitude: bool, begin: Callable[[Scaled], Steps], bits: int, bounded: bool = False) -> None:
     """Compare a step with the exact series of a known motion: coefficients, the new state, a sample inside the step.
 
-    begin: a run of a problem at its start.  bits: of its arithmetic.  bounded: the units it wants.
+    begin: makes a run of a problem.  bits: of its arithmetic.  bounded: the units of that, as :meth:`Scaled.of`.
     Raises Contradiction.
     """
     parameters = known_parameters(system).mapped(Fraction)
@@ -49,8 +46,8 @@ def check(system: System, attitude: bool, begin: Callable[[Scaled], Steps], bits
         for n, row in enumerate(exact)
     ]
     for n, row in enumerate(terms):
-        off = max(abs(a - b) for a, b in zip(run.coefficients(n), row, strict=True))
-        _require(off <= largest * Fraction(2) ** (_GUARD_BITS - bits), f"Taylor coefficient {n}", bits)
+        error = max(abs(a - b) for a, b in zip(run.coefficients(n), row, strict=True))
+        _require(error <= largest * Fraction(2) ** (_GUARD_BITS - bits), f"Taylor coefficient {n}", bits)
     tail = 4 * max(map(abs, terms[-1])) + largest * Fraction(2) ** (_GUARD_BITS - bits)
     later = run.time * _LATER
     for computed, part, what in (
@@ -58,12 +55,12 @@ def check(system: System, attitude: bool, begin: Callable[[Scaled], Steps], bits
         (run.sample(later), _LATER, "a state inside the step"),
     ):
         sums = [sum(row[i] * part**n for n, row in enumerate(terms)) for i in range(len(start))]
-        fine = computed is not None and max(abs(a - b) for a, b in zip(computed, sums, strict=True)) <= tail
-        _require(fine, what, bits)
+        agrees = computed is not None and max(abs(a - b) for a, b in zip(computed, sums, strict=True)) <= tail
+        _require(agrees, what, bits)
 
 
-def _require(fine: bool, what: str, bits: int) -> None:
-    if not fine:
+def _require(agrees: bool, what: str, bits: int) -> None:
+    if not agrees:
         raise Contradiction(
             f"Machine code in {bits} bits gives a wrong value in a step that is known: {what}.",
             "It is damaged: run again; if it stays, this machine or LLVM is faulty.",
@@ -72,126 +69,84 @@ def _require(fine: bool, what: str, bits: int) -> None:
 
 LOOSEST = Fraction(1, 10**6)
 _SPARE_BITS, _SPARE_BITS_OF_DOUBLE = 6, 17
-"""Bits beyond those of a format that double-double exceeds: a long run adds its local errors up, and the sum shall stay
-below half an eps, to T = 1000 in extended and to T = 10,000 in double (measured)."""
+"""Bits beyond those of a format narrower than double-double: the sum of the local errors of a long run stays below
+half an eps, to T = 1000 in extended and to T = 10,000 in double (measured)."""
 _GUARD_BITS = 8
 _FINEST = Fraction(1, 2 ** (double_double_run.BITS - 1))
 """The tolerance of double-double."""
 
 
-class Arithmetic(ABC):
-    """A way of computing, chosen for a format and a tolerance.
-
-    tolerance: the local error aimed at, relative to the state.
-    """
-
-    tolerance: Fraction
-
-    @property
-    def flags(self) -> dict[str, str]:
-        """Everything that can change bits; they are those of every processor."""
-        return self._bits() | {"tolerance": decimal_text(self.tolerance, 6)} | self._steps()
-
-    @abstractmethod
-    def _bits(self) -> dict[str, str]:
-        """The name of this arithmetic, its words and bits."""
-
-    def _steps(self) -> dict[str, str]:
-        """Its order, where that is fixed, and the rule of its steps."""
-        return {"step_rule": "powers of two, by the number of orders"}
-
-    @abstractmethod
-    def begin(self, scaled: Scaled, forwards: bool) -> ResumableRun:
-        """A motion at its beginning."""
-
-    @abstractmethod
-    def make(self, system: System, attitude: bool) -> float:
-        """Compile and check the machine code for this system; gives the seconds of compiling.
-
-        Raises Contradiction where its first step, which is known, is wrong.
-        """
+_STEP_RULE = {"step_rule": "powers of two, by the number of orders"}
 
 
 @dataclass(frozen=True, slots=True)
-class DoubleDouble(Arithmetic):
-    """106 bits that float, with plain doubles above an order n0.
+class DoubleDouble:
+    """106 bits in floating point, with plain doubles above an order n0.
 
-    schedule: of one motion.  in_lanes: of eight.
+    tolerance: of each arithmetic, the local error aimed at, relative to the state.  schedule: of one motion.  in_lanes:
+    of eight.
     """
 
     tolerance: Fraction
     schedule: OrderSchedule
     in_lanes: OrderSchedule
 
-    def _bits(self) -> dict[str, str]:
-        return {"arithmetic": "double-double", "words": "2", "bits": str(double_double_run.BITS)}
-
-    def _steps(self) -> dict[str, str]:
+    @property
+    def flags(self) -> dict[str, str]:
+        """All that can change bits; the same on every processor."""
         return {
+            "arithmetic": "double-double",
+            "words": "2",
+            "bits": str(double_double_run.BITS),
+            "tolerance": decimal_text(self.tolerance, 6),
             "order": str(self.schedule.order),
             "step_rule": f"radius of convergence times 2^{self.schedule.reach:.3f}, ten bits",
             "plain_orders": f"where rounding is below 2^{self.schedule.room - 53:.1f}",
         }
 
     def begin(self, scaled: Scaled, forwards: bool) -> ResumableRun:
+        """A motion at its beginning."""
         return Floating(scaled, self.schedule, forwards)
-
-    def make(self, system: System, attitude: bool) -> float:
-        made = double_double_run.machine(system, attitude)
-        check(system, attitude, lambda scaled: Floating(scaled, _FULL, True), double_double_run.BITS)
-        check(system, attitude, lambda scaled: Floating(scaled, _SPLIT, True), _SPLIT_BITS)
-        check(system, attitude, lambda scaled: Floating(scaled, _PLAIN, True, low_order=3), _PLAIN_BITS)
-        return made.seconds
-
-
-_REACH = -2.9
-# the same machine code with every order in double-double, and with nearly all in plain doubles
-_FULL = OrderSchedule(38, _REACH, -1000.0)
-_PLAIN = OrderSchedule(24, _REACH, 1000.0)
-_ALLOWED = OrderSchedule(38, _REACH, 1000.0)
-# with most orders in split coefficients
-_SPLIT, _SPLIT_ALLOWED = OrderSchedule(38, _REACH, -1000.0, -40.0), OrderSchedule(38, _REACH, 1000.0, -40.0)
-_SPLIT_BITS = 80
-_PLAIN_BITS = 53
-_CHECKED_BITS = 128
-_STEP_OF_BITS = 64
 
 
 @dataclass(frozen=True, slots=True)
-class Words(Arithmetic):
+class Words:
     """K words on fixed grids."""
 
     tolerance: Fraction
     grid: Grid
 
-    def _bits(self) -> dict[str, str]:
-        return {"arithmetic": "fixed grids", "words": str(self.grid.words), "bits": str(self.grid.total)}
+    @property
+    def flags(self) -> dict[str, str]:
+        """All that can change bits; the same on every processor."""
+        bits = {"arithmetic": "fixed grids", "words": str(self.grid.words), "bits": str(self.grid.total)}
+        return bits | {"tolerance": decimal_text(self.tolerance, 6)} | _STEP_RULE
 
     def begin(self, scaled: Scaled, forwards: bool) -> ResumableRun:
+        """A motion at its beginning."""
         return Fixed(scaled, self.grid, forwards)
-
-    def make(self, system: System, attitude: bool) -> float:
-        made = fixed_point_run.machine(self.grid, system, attitude)
-        check(system, attitude, lambda scaled: Fixed(scaled, self.grid, True), self.grid.total, bounded=True)
-        return made.seconds
 
 
 @dataclass(frozen=True, slots=True)
-class WholeNumbers(Arithmetic):
-    """Integers of ``bits`` bits, where there are no words for so many."""
+class Integers:
+    """Integers of ``bits`` bits, beyond the largest grid."""
 
     tolerance: Fraction
     bits: int
 
-    def _bits(self) -> dict[str, str]:
-        return {"arithmetic": "integers", "bits": str(self.bits)}
+    @property
+    def flags(self) -> dict[str, str]:
+        """All that can change bits; the same on every processor."""
+        bits = {"arithmetic": "integers", "bits": str(self.bits)}
+        return bits | {"tolerance": decimal_text(self.tolerance, 6)} | _STEP_RULE
 
     def begin(self, scaled: Scaled, forwards: bool) -> ResumableRun:
+        """A motion at its beginning."""
         return IntegerMotion(scaled, self.bits, forwards)
 
-    def make(self, system: System, attitude: bool) -> float:
-        check(system, attitude, lambda scaled: IntegerMotion(scaled, _CHECKED_BITS, True), _CHECKED_BITS, bounded=True)
-        return 0.0
+
+Arithmetic = DoubleDouble | Words | Integers
+_STEP_OF_BITS = 64
 
 
 @lru_cache(maxsize=64)
@@ -200,8 +155,8 @@ def wanted_tolerance(precision: Precision, tolerance: Fraction | None) -> Fracti
 
     Raises InputError for a tolerance outside 1e-6 to the format's own.
     """
-    most = _SPARE_BITS_OF_DOUBLE if precision.bits <= DOUBLE.bits else _SPARE_BITS
-    finest = precision.eps / 2 ** max(0, min(most, double_double_run.BITS - precision.bits))
+    spare = _SPARE_BITS_OF_DOUBLE if precision.bits <= DOUBLE.bits else _SPARE_BITS
+    finest = precision.eps / 2 ** max(0, min(spare, double_double_run.BITS - precision.bits))
     wanted = finest if tolerance is None else tolerance
     if not finest <= wanted <= LOOSEST:
         raise InputError(
@@ -235,14 +190,14 @@ def choose(problem: Problem, tolerance: Fraction | None) -> tuple[Arithmetic, Sc
     wanted = wanted_tolerance(problem.precision, tolerance)
     start = (*problem.start.flat, *(problem.xi or ()))
     scaled = Scaled.of(problem.system, problem.parameters, start)
-    if (machine := floats(wanted, scaled)) is not None:
-        return machine, scaled
+    if (double_double := floats(wanted, scaled)) is not None:
+        return double_double, scaled
     scaled = Scaled.of(problem.system, problem.parameters, start, bounded=True)
-    asked = wanted.denominator.bit_length() - wanted.numerator.bit_length()
-    bits = asked + _GUARD_BITS + fixed_point_run.spread(scaled) + fixed_point_run.excess(scaled)
+    accuracy_bits = wanted.denominator.bit_length() - wanted.numerator.bit_length()
+    bits = accuracy_bits + _GUARD_BITS + fixed_point_run.spread(scaled) + fixed_point_run.excess(scaled)
     grid = grid_for(bits)
     if grid is None:
-        return WholeNumbers(wanted, -(-bits // _STEP_OF_BITS) * _STEP_OF_BITS), scaled
+        return Integers(wanted, -(-bits // _STEP_OF_BITS) * _STEP_OF_BITS), scaled
     return Words(wanted, grid), scaled
 
 
@@ -256,32 +211,58 @@ def accuracy(arithmetic: Arithmetic, scaled: Scaled) -> int:
     return int(arithmetic.flags["bits"]) - _GUARD_BITS - fixed_point_run.spread(scaled) - fixed_point_run.excess(scaled)
 
 
-_made: dict[tuple[Any, ...], float] = {}
-_making = Lock()
+# Compiled once, and checked before the first use.
 
 
-def _once(key: tuple[Any, ...], make: Callable[[], float]) -> float:
-    """The result of ``make`` for this key, called once; other threads that ask wait."""
-    with _making:
-        if key not in _made:
-            _made[key] = make()
-        return _made[key]
+_REACH = -2.9
+_SPLIT_BITS = 80
+_PLAIN_BITS = 53
+_CHECKED_BITS = 128
+# every order in double-double, most orders in split coefficients, and nearly all in plain doubles
+_FULL, _FULL_IN_LANES = OrderSchedule(38, _REACH, -1000.0), OrderSchedule(38, _REACH, 1000.0)
+_SPLIT, _SPLIT_IN_LANES = OrderSchedule(38, _REACH, -1000.0, -40.0), OrderSchedule(38, _REACH, 1000.0, -40.0)
+_PLAIN = OrderSchedule(24, _REACH, 1000.0)
 
 
 def compiled(arithmetic: Arithmetic, system: System, attitude: bool) -> float:
-    """The seconds that compiling took, once for each arithmetic and system; it is checked then."""
-    key = (type(arithmetic), getattr(arithmetic, "grid", None), system.name, attitude)
-    return _once(key, lambda: arithmetic.make(system, attitude))
+    """The seconds of compiling the machine code for this system at its first use.
+
+    Raises Contradiction where its first step, which is known, is wrong.
+    """
+    if isinstance(arithmetic, DoubleDouble):
+        return _double_double(system, attitude)
+    return (
+        _integers(system, attitude) if isinstance(arithmetic, Integers) else _words(arithmetic.grid, system, attitude)
+    )
 
 
+@OncePerArguments
+def _double_double(system: System, attitude: bool) -> float:
+    seconds = double_double_run.machine(system, attitude).seconds
+    check(system, attitude, lambda scaled: Floating(scaled, _FULL, True), double_double_run.BITS)
+    check(system, attitude, lambda scaled: Floating(scaled, _SPLIT, True), _SPLIT_BITS)
+    check(system, attitude, lambda scaled: Floating(scaled, _PLAIN, True, low_order=3), _PLAIN_BITS)
+    return seconds
+
+
+@OncePerArguments
+def _words(grid: Grid, system: System, attitude: bool) -> float:
+    seconds = fixed_point_run.machine(grid, system, attitude).seconds
+    check(system, attitude, lambda scaled: Fixed(scaled, grid, True), grid.total, bounded=True)
+    return seconds
+
+
+@OncePerArguments
+def _integers(system: System, attitude: bool) -> float:
+    check(system, attitude, lambda scaled: IntegerMotion(scaled, _CHECKED_BITS, True), _CHECKED_BITS, bounded=True)
+    return 0.0
+
+
+@OncePerArguments
 def compiled_lanes(system: System) -> float:
-    """The seconds that compiling the code of eight lanes took; it is checked then as :meth:`Arithmetic.make` does."""
-
-    def make() -> float:
-        seconds, one = eight_lane_run.machine(system).seconds, eight_lane_run.OneOfEight
-        check(system, False, lambda scaled: one(scaled, _ALLOWED, _ALLOWED.order - 1), double_double_run.BITS)
-        check(system, False, lambda scaled: one(scaled, _SPLIT_ALLOWED, 30), _SPLIT_BITS)
-        check(system, False, lambda scaled: one(scaled, _PLAIN, 3), _PLAIN_BITS)
-        return seconds
-
-    return _once((eight_lane_run.Eight, system.name), make)
+    """The seconds of compiling the code of eight lanes at its first use; raises Contradiction as :func:`compiled`."""
+    seconds, lane = eight_lane_run.machine(system).seconds, eight_lane_run.OneOfEight
+    check(system, False, lambda scaled: lane(scaled, _FULL_IN_LANES, _FULL_IN_LANES.order - 1), double_double_run.BITS)
+    check(system, False, lambda scaled: lane(scaled, _SPLIT_IN_LANES, 30), _SPLIT_BITS)
+    check(system, False, lambda scaled: lane(scaled, _PLAIN, 3), _PLAIN_BITS)
+    return seconds

@@ -7,17 +7,18 @@ from typing import Any
 import numpy
 from CyRK import cyjit, nbsolve2_ivp
 
-from heavytop.integrate.peers.double import Request, Solution, Solve, compiled_once, count, double_peer, fill, timed
+from heavytop.integrate.peers.double import Request, Solution, Solve, count, double_peer, fill, timed
 from heavytop.integrate.trajectory import Outcome
+from heavytop.precision import OncePerArguments
 from heavytop.top.equations import System
 
 
-@compiled_once
+@OncePerArguments
 def _machine_code(system: System, width: int) -> Any:
     return cyjit(fill(system, width))
 
 
-@compiled_once
+@OncePerArguments
 def _warm(system: System, width: int, method: str) -> None:
     """Compiles what a first call would compile."""
     _call(Request(system, numpy.zeros(width), numpy.ones(1), numpy.ones(count(system)), 1e-3), method).free()

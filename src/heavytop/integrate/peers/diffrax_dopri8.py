@@ -10,15 +10,16 @@ import jax
 import jax.numpy as jnp
 import numpy
 
-from heavytop.integrate.peers.double import Request, Solution, compiled_once, count, double_peer, reader, timed
+from heavytop.integrate.peers.double import Request, Solution, count, double_peer, reader, timed
 from heavytop.integrate.trajectory import Outcome
+from heavytop.precision import OncePerArguments
 from heavytop.top.equations import System
 
 _LEAST_STEP = 2.0**-60  # of the whole time
 _MOST_STEPS = 2**24
 
 
-@compiled_once
+@OncePerArguments
 def _compiled(system: System, width: int, samples: int) -> Callable[..., Any]:
     """The integration of so many numbers to so many times as machine code."""
     read = reader(system)

@@ -6,11 +6,10 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cache, partial, wraps
+from functools import partial
 from importlib.util import find_spec
-from threading import RLock
 from time import perf_counter
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal
 
 import numpy
 
@@ -19,7 +18,7 @@ from heavytop.errors import InputError, PeerFailed, Unsupported, quoted
 from heavytop.integrate.peers.contract import DEFAULT_STEP, Declared, of_quaternion, quaternion, with_tolerance
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.multiword.codegen.machine_code import Doubles
-from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number
+from heavytop.precision import DOUBLE, OncePerArguments, Precision, decimal_text, exact, number
 from heavytop.top.attitude import matrix_of_quaternion
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State, check_times
@@ -285,22 +284,7 @@ def _states(name: str, returned: Any, count: int, width: int) -> Any:
     return states.astype(float)
 
 
-Made = TypeVar("Made")
-
-
-def compiled_once(make: Callable[..., Made]) -> Callable[..., Made]:
-    """``make``, called once for the same arguments: what one thread compiles, the others wait for."""
-    known, compiling = cache(make), RLock()
-
-    @wraps(make)
-    def look_up(*arguments: Any) -> Made:
-        with compiling:
-            return known(*arguments)
-
-    return look_up
-
-
-@compiled_once
+@OncePerArguments
 def compiler() -> Callable[[Any], Any]:
     """numba's ``njit``, taught the vector product of this program; the identity where numba is not installed."""
     try:
@@ -325,7 +309,7 @@ def count(system: System) -> int:
     return 9 if system is HEAVY_GYROSTAT else 7
 
 
-@compiled_once
+@OncePerArguments
 def fill(system: System, width: int = 6) -> Callable[..., None]:
     """(rates, t, y, numbers): writes the field at y, of ``width`` numbers, 6 or 9 with ξ, into ``rates``.
 
@@ -353,7 +337,7 @@ def fill(system: System, width: int = 6) -> Callable[..., None]:
     return write_with_attitude
 
 
-@compiled_once
+@OncePerArguments
 def rates(system: System, width: int = 6) -> Callable[..., Any]:
     """(t, y, numbers) -> the field at y as a new array; machine code where numba is installed."""
     write = compiler()(fill(system, width))

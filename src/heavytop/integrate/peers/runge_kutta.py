@@ -17,7 +17,6 @@ from heavytop.errors import InputError
 from heavytop.integrate.peers.double import (
     Request,
     Solution,
-    compiled_once,
     compiler,
     count,
     double_peer,
@@ -27,6 +26,7 @@ from heavytop.integrate.peers.double import (
 )
 from heavytop.integrate.trajectory import Trajectory
 from heavytop.multiword.codegen.machine_code import Doubles
+from heavytop.precision import OncePerArguments
 from heavytop.top.equations import System
 
 Coefficient = Fraction | float | int
@@ -58,7 +58,7 @@ class Tableau:
         return double_peer(name, self.order, partial(_solve, self), "step", attitude=True)
 
 
-@compiled_once
+@OncePerArguments
 def _stepper(system: System, width: int) -> Callable[..., None]:
     """(y, numbers, h, count, a, b): ``count`` steps of size h."""
     jit = compiler()

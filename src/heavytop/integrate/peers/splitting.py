@@ -18,7 +18,6 @@ from heavytop.integrate.peers.double import (
     Request,
     Solution,
     Solve,
-    compiled_once,
     compiler,
     count,
     double_peer,
@@ -27,6 +26,7 @@ from heavytop.integrate.peers.double import (
     timed,
 )
 from heavytop.multiword.codegen.machine_code import Doubles
+from heavytop.precision import OncePerArguments
 from heavytop.top.equations import HEAVY_GYROSTAT, Parameters, System
 
 _SUZUKI = 1 / (4 - 4 ** (1 / 3))
@@ -47,7 +47,7 @@ STAGES = {
 }
 
 
-@compiled_once
+@OncePerArguments
 def _stepper(system: System) -> Callable[..., None]:
     """(M, γ, and ξ or not, in one array, numbers, k, h, count, stages): ``count`` steps of size h."""
     jit = compiler()

@@ -10,14 +10,15 @@ from typing import Any
 import numpy
 from sksundae.cvode import CVODE
 
-from heavytop.integrate.peers.double import Request, Solution, compiled_once, compiler, count, double_peer, fill, timed
+from heavytop.integrate.peers.double import Request, Solution, compiler, count, double_peer, fill, timed
 from heavytop.integrate.trajectory import Outcome
+from heavytop.precision import OncePerArguments
 from heavytop.top.equations import System
 
 _MOST_STEPS = 10**8
 
 
-@compiled_once
+@OncePerArguments
 def _machine_code(system: System, width: int) -> Any:
     write = compiler()(fill(system, width))
     write(numpy.empty(width), 0.0, numpy.zeros(width), numpy.ones(count(system)))
