@@ -18,7 +18,7 @@ from time import perf_counter, process_time
 from heavytop.api.integrators import new_integrator
 from heavytop.cases import CASES
 from heavytop.harness.case_text import ensemble_of
-from heavytop.integrate.peers.command import Command, CommandIntegrator, ProgramRequest, Session
+from heavytop.integrate.peers.command import Command, ProgramRequest, Session
 from heavytop.integrate.registry import commands_in
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE, exact, number
@@ -62,7 +62,7 @@ def main() -> None:
         spent = median(asked(session, one))
         print(f"a request for one time: {1e6 * spent:.1f} us, the program's own {1e6 * own:.1f} us,")
         print(f"  above it {1e6 * (spent - own):.1f} us (median of {REQUESTS})")
-        integrate, whole = CommandIntegrator(command), []
+        integrate, whole = command.integrate, []
         for _ in range(2000):
             began = perf_counter()
             integrate(case.top, case.start, [Fraction(1)], DOUBLE, step=STEP)

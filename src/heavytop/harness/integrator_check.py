@@ -394,7 +394,7 @@ class _Contract:
     def _unknown_lines(self) -> str:
         assert self.program is not None
         own = self.program.request(self._problem(), [exact(Fraction(1))], self._default())
-        request = _Extended(own.problem, own.times, own.control, own.hex, own.quaternion, own.body)
+        request = _Extended(own.problem, own.times, own.control, own.hexadecimal, own.quaternion, own.body)
         try:
             with session(self.program) as program:
                 reply = program.ask(request)
@@ -463,7 +463,7 @@ class _Contract:
 
     def _default(self) -> Fraction | None:
         assert self.program is not None
-        return self.program.load().default(self.precision)
+        return self.program.default(self.precision)
 
     def _off_start(self, state: Sequence[Any]) -> str:
         """By how much a state is off the start, in words; "" where it is that, bit for bit."""

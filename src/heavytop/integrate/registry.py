@@ -36,7 +36,7 @@ from heavytop.errors import (
     why,
 )
 from heavytop.extras import extra_of, missing
-from heavytop.integrate.peers.command import Command, CommandIntegrator
+from heavytop.integrate.peers.command import Command
 from heavytop.integrate.peers.contract import CheckedPlugin, Declared, contained, quiet, require_equal, said
 from heavytop.integrate.peers.source import PythonFile, PythonObject, place_of
 from heavytop.integrate.trajectory import EnsembleObserver, Finished, Observer, Outcome, Problem, Trajectory
@@ -541,10 +541,10 @@ def _program(command: Command, control: tuple[str, Fraction] | None) -> Peer:
     """The program with that control; one that says that it failed raises PeerFailed with what it said."""
     if control is not None and control[0] != command.control:
         raise PeerFailed(f"{command.name} has no {control[0]}")
-    integrate: Peer = CommandIntegrator(command)
+    integrate = partial(command.load(), **dict([control] if control else []))
 
     def call(*arguments: Any, **options: Any) -> Trajectory:
-        run = integrate(*arguments, **options, **dict([control] if control else []))
+        run: Trajectory = integrate(*arguments, **options)
         if run.outcome is Outcome.FAILED:
             raise PeerFailed(f"{command.name} failed: {run.flags['failure']}", answered=True)
         return run
@@ -693,7 +693,7 @@ def propagator(which: str | IntegratorSource, options: dict[str, Any]) -> Callab
 def _unguarded(which: str | IntegratorSource, options: dict[str, Any]) -> Callable[..., Any]:
     integrator = described(which)
     if isinstance(integrator.source, Command):
-        return _with(CommandIntegrator(integrator.source), integrator.name, options)
+        return _with(integrator.source.integrate, integrator.name, options)
     if integrator.streams:
         return _with(loaded(integrator.function), integrator.name, options)
     _with(integrator.load(), integrator.name, options)

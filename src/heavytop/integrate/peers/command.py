@@ -1,8 +1,9 @@
 """Integrators that are programs: text over standard input and output, one item per line, one process for many requests.
 
-The protocol is in docs/gate.md.  A :class:`Command` is what a TOML table says of the program, a :class:`Session`
-its running process, and a :class:`CommandIntegrator` the call of :mod:`heavytop.integrate.peers`.  Whatever the program
-does comes out as a Trajectory that keeps the contract or as PeerFailed, and its process group ends with this process.
+The protocol is in docs/gate.md.  A :class:`Command` is the program as a TOML table describes it, and its
+:meth:`Command.integrate` the call of :mod:`heavytop.integrate.peers`; a :class:`Session` is its running process.
+Whatever the program does becomes a Trajectory that keeps the contract or PeerFailed, and its process group ends with
+this process.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ import select
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
 from math import ceil, inf, isfinite
@@ -48,15 +50,15 @@ _MOST_LINE = 1 << 20
 _MOST_ERRORS = 2000
 _CHUNK = 1 << 16
 _LOOK = 0.1
-"""Seconds between two looks whether a silent program is still there."""
+"""Seconds between two checks that a silent program still runs."""
 _AWAKE = 2e-4
-"""Seconds for which an answer is waited for awake: to be woken takes 1e-4."""
+"""Seconds of busy waiting for an answer: waking up takes 1e-4."""
 _FAREWELL = 0.3
 """Seconds that a program has to end after `quit`."""
 _MOST_OVERHEAD = 1e-3
-"""Seconds of a request without times that are taken off at most: what a program does there is its own affair."""
+"""The most seconds of a request without times that are subtracted; a program may do in it what it likes."""
 _LEAST_SHARE = 0.1
-"""Part of the seconds of a request, which remain at least: less than its noise is not measured."""
+"""The least fraction of the seconds of a request that remains: less than its noise is not measured."""
 _RESOLUTION = 1e-4
 """Seconds by which requests without times differ, on a busy machine; fewer are not resolved."""
 _DECIMAL = rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -67,10 +69,10 @@ _PAIRS = {"steps": int, "evaluations": int, "seconds": float, "joint": float}
 class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A program that integrates, as the table `[[integrator]]` describes it.
 
-    name: in rows.  command: the program and its arguments, relative to ``folder``.  setting: what it is set by.
-    precisions, systems, directions, attitude, one_step, fixed_grid, singular_at: what it declares that it can do, as
+    name: in rows.  command: the program and its arguments, relative to ``folder``.  setting: its control.
+    precisions, systems, directions, attitude, one_step, fixed_grid, singular_at: its declared capabilities, as
     :class:`heavytop.integrate.peers.contract.Declared`.  timeout: seconds of one request.
-    hex: whether it is given hexadecimal numbers.  bodies: whether it is given a body with mass, gravity and the tensor
+    hex: whether it is sent hexadecimal numbers.  bodies: whether it is sent a body with mass, gravity and the tensor
     about the centre of mass.  folder: of the file; its working directory.
     """
 
@@ -109,16 +111,16 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         return Declared(*able, self.one_step, self.fixed_grid, singular)
 
     def request(self, problem: Problem, times: Sequence[Fraction], setting: Fraction | None) -> ProgramRequest:
-        """A request, in the form that it declares; raises Unsupported where it needs a body and none is."""
+        """A request in the form that it declares; raises Unsupported where it needs a body that cannot be."""
         top = (problem.given or (problem.top, problem.start))[0]
         body = Body.realising(top) if self.bodies else None
         if self.bodies and body is None:
             raise Unsupported(f"{self.name} needs a body, and none has these moments.", "`heavytop list` marks bodies.")
         return ProgramRequest(problem, times, setting, self.hex, self.attitude == "quaternion", body)
 
-    def load(self) -> CommandIntegrator:
-        """The callable that integrates with it; nothing is started yet."""
-        return CommandIntegrator(self)
+    def load(self) -> Callable[..., Trajectory]:
+        """:meth:`integrate`; nothing is started yet."""
+        return self.integrate
 
     def argv(self) -> list[str]:
         """The program as an absolute path and its arguments; raises PeerFailed if it is missing."""
@@ -130,14 +132,7 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
             raise PeerFailed(f"{self.name}: {said(program)} is not executable")
         return [os.path.abspath(path), *rest]
 
-
-class CommandIntegrator:
-    """The call of :mod:`heavytop.integrate.peers` for a program; every failure of the program is PeerFailed."""
-
-    def __init__(self, command: Command) -> None:
-        self.command = command
-
-    def __call__(
+    def integrate(
         self,
         top: HeavyTop,
         start: State,
@@ -148,33 +143,32 @@ class CommandIntegrator:
         xi: tuple[Fraction, ...] | None = None,
         **control: Fraction,
     ) -> Trajectory:
-        """The run; its seconds are those of the request here, less those of one without times.
+        """The call of :mod:`heavytop.integrate.peers`; its seconds are those of the request less an empty one.
 
         Raises Unsupported for what the program declares that it cannot do, InputError for a control that it does not
         have, PeerFailed for whatever else goes wrong.  A program that says ``failed`` is a Trajectory to there whose
         outcome is ``failed``.
         """
-        command = self.command
         instants = check_times(times)
-        declared = command.declared
-        declared.require(command.name, start, system, instants[-1], precision, xi)
-        value = self._control(control, precision)
-        if value is not None and command.control == "step":
-            value = exact(number(declared.step(command.name, value, instants), precision))
+        declared = self.declared
+        declared.require(self.name, start, system, instants[-1], precision, xi)
+        value = self._control_value(control, precision)
+        if value is not None and self.control == "step":
+            value = exact(number(declared.step(self.name, value, instants), precision))
         problem = Problem.of(top, start, precision, system, xi)
         grid = [exact(number(time, precision)) for time in instants]
-        request = command.request(problem, grid, value)
-        with session(command) as program:
+        request = self.request(problem, grid, value)
+        with session(self) as program:
             overhead = program.empty_request(problem)
             reply = program.ask(request)
         return self._trajectory(request, reply, max(reply.wall - overhead, _LEAST_SHARE * reply.wall))
 
-    def _control(self, settings: dict[str, Fraction], precision: Precision) -> Fraction | None:
-        control = self.command.control
+    def _control_value(self, settings: dict[str, Fraction], precision: Precision) -> Fraction | None:
+        control = self.control
         for name in settings:
             if name != control:
                 remedy = f"Leave it out: {argument(control)} sets its accuracy." if control else "Leave it out."
-                raise InputError(f"The integrator {self.command.name} has no {argument(name)}.", remedy)
+                raise InputError(f"The integrator {self.name} has no {argument(name)}.", remedy)
         if not control:
             return None
         value = settings.get(control)
@@ -182,42 +176,41 @@ class CommandIntegrator:
             return self.default(precision)
         if value <= 0 or (control == "tolerance" and value > 1):
             limits = "above 0" if control == "step" else "above 0, up to 1"
-            raise InputError(
-                f"{self.command.name} cannot use the {control} {decimal_text(value, 6)}.", f"Give {limits}."
-            )
+            raise InputError(f"{self.name} cannot use the {control} {decimal_text(value, 6)}.", f"Give {limits}.")
         return exact(number(value, precision))
 
     def default(self, precision: Precision) -> Fraction | None:
-        """The control where none is asked for: the step 1/100 as a number of the format, or the eps of the format."""
-        if self.command.control == "step":
+        """The default of its control: the step 1/100 as a number of the format, or the eps of the format."""
+        if self.control == "step":
             return exact(number(DEFAULT_STEP, precision))
-        return precision.eps if self.command.control else None
+        return precision.eps if self.control else None
 
     def _trajectory(self, request: ProgramRequest, reply: Reply, seconds: float) -> Trajectory:
-        command, problem, done = self.command, request.problem, len(reply.states)
-        flags = {command.control: number_text(request.control, problem.precision)} if request.control else {}
+        problem, done = request.problem, len(reply.states)
+        flags = {self.control: number_text(request.control, problem.precision)} if request.control else {}
         steps = reply.counts.get("steps")
-        if steps is None and command.control == "step" and not reply.failure:
+        if steps is None and self.control == "step" and not reply.failure:
             assert request.control is not None
             steps = sum(ceil(abs(b - a) / request.control) for a, b in pairwise([Fraction(0), *request.times]))
         if steps is None:
             flags |= NOT_COUNTED
         if reply.failure:
             flags["failure"] = reply.failure
-        turned = (of_quaternion(command.name, problem, state) for state in reply.states)
-        states = tuple(turned if request.quaternion else reply.states)
+        states = reply.states
+        if request.quaternion:
+            states = [of_quaternion(self.name, problem, state) for state in states]
         spent = {"compile": 0.0, "run": seconds} | ({UNRESOLVED_SECONDS: _RESOLUTION} if seconds < _RESOLUTION else {})
-        own = reply.counts.get("seconds")
+        own_seconds = reply.counts.get("seconds")
         return Trajectory(
             problem,
-            command.name,
+            self.name,
             tuple(request.times[:done]),
-            states,
+            tuple(states),
             Outcome.FAILED if reply.failure else Outcome.SUCCESS,
             request.times[done - 1] if done else Fraction(0),
             int(steps or 0),
-            command.order,
-            spent if own is None else spent | {"program": own},
+            self.order,
+            spent if own_seconds is None else spent | {"program": own_seconds},
             flags,
             reply.counts.get("evaluations"),
             joint_violation=reply.counts.get("joint"),
@@ -231,28 +224,26 @@ def number_text(value: Fraction, precision: Precision, hexadecimal: bool = False
     return f"{float(value):.17g}" if precision == DOUBLE else decimal_text(value, precision.digits)
 
 
+@dataclass(frozen=True, slots=True)
 class ProgramRequest:
-    """A problem with its times, as a program is asked for it.
+    """A problem with its times, as it is sent to a program.
 
     times: exact numbers of the format; none for a request that does nothing.  control: of the format, or None.
-    quaternion: whether the program computes with one: it is given that of the start, and answers (Ω, w, x, y, z).
-    body: for a program that is given one.
-    width: of a state of the answer.
+    hexadecimal: the form of its numbers.  quaternion: whether the program computes with one: it is sent that of the
+    start, and answers (Ω, w, x, y, z).  body: for a program that is sent one.
     """
 
-    def __init__(
-        self,
-        problem: Problem,
-        times: Sequence[Fraction],
-        control: Fraction | None,
-        hexadecimal: bool,
-        quaternion: bool = False,
-        body: Body | None = None,
-    ) -> None:
-        self.body = body
-        self.problem, self.times, self.control, self.hex = problem, list(times), control, hexadecimal
-        self.quaternion = quaternion
-        self.width = 7 if quaternion else 6 if problem.xi is None else 9
+    problem: Problem
+    times: Sequence[Fraction]
+    control: Fraction | None
+    hexadecimal: bool
+    quaternion: bool = False
+    body: Body | None = None
+
+    @property
+    def width(self) -> int:
+        """Numbers of a state of the answer."""
+        return 7 if self.quaternion else 6 if self.problem.xi is None else 9
 
     def text(self, label: int) -> bytes:
         """Its lines."""
@@ -284,13 +275,13 @@ class ProgramRequest:
 
     def _numbers(self, values: Sequence[Any]) -> list[str]:
         precision = self.problem.precision
-        if precision == DOUBLE and not self.hex:
+        if precision == DOUBLE and not self.hexadecimal:
             return [f"{float(value) + 0.0:.17g}" for value in values]
-        return [number_text(Fraction(value), precision, self.hex) for value in values]
+        return [number_text(Fraction(value), precision, self.hexadecimal) for value in values]
 
 
 class Reply:
-    """The answer of a program: states of the format, counts, and what it says went wrong; wall: seconds here."""
+    """The answer of a program: states of the format, counts, and the failure that it reports; wall: seconds here."""
 
     def __init__(self, name: str, request: ProgramRequest) -> None:
         self.name, self.request = name, request
@@ -303,7 +294,7 @@ class Reply:
         self._pattern = _STATE_OF_DOUBLES[request.width]
 
     def take(self, line: bytes) -> bool:
-        """Takes a line, and says whether it was the last; raises PeerFailed for one that breaks the protocol."""
+        """Read a line; True for the last one.  Raises PeerFailed for one that breaks the protocol."""
         if self._doubles and self._pattern.fullmatch(line):
             time, *values = map(float, line.split()[1:])
             if (
@@ -374,27 +365,10 @@ class Reply:
             self.counts[name] = value
 
 
-class _Greeting:
-    """Takes the first line of a program: ``ready``, its name and version."""
-
-    text = ""
-
-    def __init__(self, name: str) -> None:
-        self.name = name
-
-    def take(self, line: bytes) -> bool:
-        """Raises PeerFailed for another line."""
-        text = line.decode("utf-8", "replace")
-        if text.split()[:1] != ["ready"]:
-            raise PeerFailed(f"{self.name} began with {said(repr(text))} instead of ready NAME VERSION")
-        self.text = said(text.partition("ready")[2])
-        return True
-
-
 class Session:
     """A running program, which serves one request after the other.
 
-    Whoever gets an exception from it ends it with :meth:`close`.  greeting: what it said after ``ready``.
+    A caller that gets an exception ends it with :meth:`close`.  greeting: the text after ``ready``.
     """
 
     def __init__(self, command: Command) -> None:
@@ -425,16 +399,22 @@ class Session:
         self._poll = select.poll()
         self._poll.register(self._out, select.POLLIN)
         self._poll.register(self._err, select.POLLIN)
-        greeting = _Greeting(self.name)
         try:
-            self._exchange(f"{HELLO}\n".encode(), greeting, "ready")
+            self._exchange(f"{HELLO}\n".encode(), self._greet, "ready")
         except BaseException:
             self.close()
             raise
-        self.greeting = greeting.text
+
+    def _greet(self, line: bytes) -> bool:
+        """Take the first line of the program; raises PeerFailed for another than ``ready NAME VERSION``."""
+        text = line.decode("utf-8", "replace")
+        if text.split()[:1] != ["ready"]:
+            raise PeerFailed(f"{self.name} began with {said(repr(text))} instead of ready NAME VERSION")
+        self.greeting = said(text.partition("ready")[2])
+        return True
 
     def empty_request(self, problem: Problem) -> float:
-        """Seconds of a request without times, which begins each row; the least of this process, and at most 1 ms."""
+        """Seconds of a request without times, which begins each row: the minimum over this process, at most 1 ms."""
         if not self._began_row:
             for _ in range(1 if self.requests else 2):  # the first of a process is slow
                 wall = self.ask(self.command.request(problem, [], None)).wall
@@ -459,11 +439,11 @@ class Session:
         reply = Reply(self.name, request)
         text = request.text(self.requests)
         seconds = stopwatch(self.process.pid)
-        reply.wall = seconds(self._exchange(text, reply, "done", most))
+        reply.wall = seconds(self._exchange(text, reply.take, "done", most))
         return reply
 
-    def _exchange(self, text: bytes, reply: Reply | _Greeting, awaited: str, seconds: float = inf) -> float:
-        """Writes ``text`` and hands over line after line until ``reply`` has its last; nothing may be left then.
+    def _exchange(self, text: bytes, take: Callable[[bytes], bool], awaited: str, seconds: float = inf) -> float:
+        """Write ``text`` and pass on line after line until ``take`` has its last; nothing may be left then.
 
         Returns for how many seconds this thread had no processor since it last found nothing to read.
         """
@@ -475,7 +455,7 @@ class Session:
         while True:
             if waiting and not (waiting := self._write(waiting)):
                 self._poll.unregister(self._in)
-            if self._lines(reply):
+            if self._lines(take):
                 return waited_for_processor() - looked
             left = deadline - monotonic()
             if left <= 0:
@@ -500,8 +480,8 @@ class Session:
                 waiting = memoryview(b"")
         return waiting
 
-    def _lines(self, reply: Reply | _Greeting) -> bool:
-        """Hands over the whole lines that are there."""
+    def _lines(self, take: Callable[[bytes], bool]) -> bool:
+        """Pass on the whole lines received so far."""
         if b"\n" not in self._unread:
             if len(self._unread) > _MOST_LINE:
                 raise self._failed(f"wrote a line of more than {_MOST_LINE} characters")
@@ -509,7 +489,7 @@ class Session:
         *lines, self._unread = self._unread.split(b"\n")
         for count, line in enumerate(lines, 1):
             try:
-                last = reply.take(line)
+                last = take(line)
             except PeerFailed as error:
                 raise self._failed(error.cause.removeprefix(f"{self.name} "), error.answered) from None
             if last:
@@ -534,7 +514,7 @@ class Session:
         return bool(data)
 
     def _read(self, descriptor: int) -> bytes | None:
-        """The bytes that are there; empty at the end, None where nothing is there yet."""
+        """The bytes available; empty at the end of the file, None where there are none yet."""
         try:
             return os.read(descriptor, _CHUNK)
         except BlockingIOError:
@@ -554,12 +534,12 @@ class Session:
         return "closed its output"
 
     def _failed(self, what: str, answered: bool = False) -> PeerFailed:
-        """The failure, with the last that the program wrote on standard error."""
+        """The failure, with the last lines of the program's standard error."""
         for _ in range(4):
             self._read_errors()
         lines = [said(line) for line in self._errors.decode("utf-8", "replace").splitlines() if line.strip()]
-        told = f"; its standard error ends with: {said(' | '.join(lines[-3:])[-180:])}" if lines else ""
-        return PeerFailed(f"{self.name} {what}{told}", answered=answered)
+        ending = f"; its standard error ends with: {said(' | '.join(lines[-3:])[-180:])}" if lines else ""
+        return PeerFailed(f"{self.name} {what}{ending}", answered=answered)
 
     def ends_after(self, text: bytes, seconds: float) -> bool:
         """Whether the program ends by itself within so many seconds of ``text`` and the end of its input."""
@@ -573,7 +553,7 @@ class Session:
         return False
 
     def close(self, farewell: float = 0.0) -> None:
-        """Ends the program: `quit`, so many seconds, then its whole process group is killed."""
+        """End the program: send `quit`, wait ``farewell`` seconds, kill its process group."""
         with suppress(OSError):
             os.write(self._in, b"quit\n")
         for pipe in self._pipes:
@@ -591,7 +571,7 @@ _lock = Lock()
 
 @contextmanager
 def session(command: Command) -> Iterator[Session]:
-    """A running program of its own for the caller's thread, ended where anything goes wrong, else kept for the next."""
+    """A running program for this thread alone; it is ended where anything raises, else kept for the next request."""
     with _lock:
         sessions = _idle.get(command, [])
         program = sessions.pop() if sessions else None
@@ -617,7 +597,7 @@ def begin_row() -> None:
 
 
 def close_all() -> None:
-    """Ends every program that is not in use."""
+    """End every idle program."""
     with _lock:
         programs = [program for sessions in _idle.values() for program in sessions]
         _idle.clear()
