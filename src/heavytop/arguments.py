@@ -55,20 +55,16 @@ def is_a(value: object, kind: type[_Kind], what: str) -> _Kind:
     return value
 
 
+@cache_last_call
 def motion(
     top: object, start: object, precision: Precision = DOUBLE, *, of_any_size: bool = False
 ) -> tuple[HeavyTop | Body, State]:
     """A top, or a body, and a start that it can have.
 
-    of_any_size: for what computes with exact numbers alone, which no format bounds.
+    of_any_size: for exact computations, which no format bounds.
     Raises InputError for other types, data beyond 1e150, and a γ off the unit sphere by more than rounding to
     ``precision`` explains.
     """
-    return _checked(top, start, precision, of_any_size)
-
-
-@cache_last_call
-def _checked(top: object, start: object, precision: Precision, of_any_size: bool) -> tuple[HeavyTop | Body, State]:
     body: HeavyTop | Body = top if isinstance(top, Body) else is_a(top, HeavyTop, "top")
     state = is_a(start, State, "start")
     for text in body.warnings():

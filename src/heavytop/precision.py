@@ -19,7 +19,7 @@ from math import isqrt
 from numbers import Rational
 from operator import index, is_
 from threading import RLock
-from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, SupportsIndex, TypeAlias, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Generic, ParamSpec, Protocol, Self, SupportsIndex, TypeAlias, TypeVar, cast
 
 from heavytop.errors import HeavyTopError, InputError, argument, quoted
 from heavytop.extras import import_heyoka
@@ -480,24 +480,27 @@ def native_text(value: Any, precision: Precision) -> str:
 # Cached results of functions.
 
 
+P = ParamSpec("P")
 Result = TypeVar("Result")
 
 
-def cache_last_call(function: Callable[..., Result]) -> Callable[..., Result]:
-    """``function`` of immutable positional arguments, called again only where one of them is another object.
+def cache_last_call(function: Callable[P, Result]) -> Callable[P, Result]:
+    """``function`` of immutable arguments, called again only where one of them is another object.
 
-    An exception is not cached.  Threads may call it: at worst each computes for itself.
+    A call with keywords is not cached, nor is an exception.  Threads may call it: at worst each computes for itself.
     """
     cached: tuple[tuple[Any, ...], Any] | None = None
 
     @wraps(function)
-    def look_up(*arguments: Any) -> Result:
+    def look_up(*arguments: P.args, **named: P.kwargs) -> Result:
         nonlocal cached
+        if named:
+            return function(*arguments, **named)
         last = cached
         if last is not None and len(last[0]) == len(arguments) and all(map(is_, last[0], arguments)):
             value: Result = last[1]
             return value
-        value = function(*arguments)
+        value = function(*arguments, **named)
         cached = arguments, value
         return value
 

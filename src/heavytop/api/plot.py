@@ -180,7 +180,7 @@ def herpolhode(
         InputError: as :func:`sphere`.
     """
     curves = samples(run)
-    rows = curves.rows()
+    rows = curves.rotations()
     omega = np.einsum("nij,nj->ni", rows, curves.omega)
     free, across = _free(run, top), np.eye(3)[:2]
     if free is not None:
@@ -378,7 +378,7 @@ def animate(
     file = None if path is None else arguments.path(path, "path")
     writer = None if file is None else _writer(file.suffix.lower(), rate or 1)
     name, locus, line = path_in_space(run, "axis3" if of == "vertical" else of, top)
-    rows, drawn = locus.rows(), _solid(None)
+    rows, drawn = locus.rotations(), _solid(None)
     _globe(drawn)
     drawn.set(xlabel="x", ylabel="y", zlabel="z, up")
     arms = [drawn.plot([], [], [], color=COLOURS[i + 1], lw=2.2, label=f"axis {i + 1}")[0] for i in range(3)]

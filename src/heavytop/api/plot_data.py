@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, Protocol, runtime_checkable
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from heavytop.api.motions import propagate
 from heavytop.errors import InputError, quoted
+from heavytop.integrate.frames import framed
 from heavytop.integrate.trajectory import Problem, Trajectory
 from heavytop.measure.reference import Reference
 from heavytop.precision import exact
@@ -78,18 +79,26 @@ class SpacedErrors(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """times: (n,).  omega, gamma: (n, 3), in body axes.  xi: (n, 3), the space axis x in body axes, or None."""
+    """times: (n,).  omega, gamma: (n, 3), in body axes."""
 
     run: Motion
     times: NDArray[np.float64]
     omega: NDArray[np.float64]
     gamma: NDArray[np.float64]
-    xi: NDArray[np.float64] | None
 
-    def rows(self) -> NDArray[np.float64]:
-        """R at every sample, (n, 3, 3): its rows are ξ, γ × ξ, γ, so that v_space = R v_body."""
-        xi = self.xi if self.xi is not None else _integrated_xi(self.run)
-        return np.stack([xi, np.cross(self.gamma, xi), self.gamma], axis=1)
+    def rotations(self) -> NDArray[np.float64]:
+        """R at every sample, (n, 3, 3), v_space = R v_body.
+
+        A computed motion without attitude is run again with it; raises InputError for a known one.
+        """
+        run = self.run
+        if isinstance(run, Reference):
+            if run.attitude is None:
+                raise InputError(
+                    "This reference has no attitude.", "Ask for it: heavytop.reference(..., attitude=True)."
+                )
+            return run.matrices()
+        return (_with_attitude(run) if run.problem.xi is None else run).matrices()
 
 
 def samples(run: Any) -> Samples:
@@ -109,24 +118,11 @@ def samples(run: Any) -> Samples:
         first = int(np.flatnonzero(~np.isfinite(states).all(axis=1))[0])
         raise InputError(f"The state of sample {first} is not finite.", "Draw the part of the run before it.")
     times = np.array([float(exact(time)) for time in run.times])[:count]
-    return Samples(run, times, states[:, :3], states[:, 3:6], _xi(run, states))
+    return Samples(run, times, states[:, :3], states[:, 3:6])
 
 
-def _xi(run: Motion, states: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    attitude = getattr(run, "attitude", None)
-    if isinstance(run, Reference):
-        if attitude is None:
-            return None
-        return np.array([[float(ball.value) for ball in row] for row in attitude])
-    if attitude is not None:
-        return np.array([[float(value) for value in row] for row in attitude])
-    return states[:, 6:9] if states.shape[1] == 9 else None
-
-
-def _integrated_xi(run: Motion) -> NDArray[np.float64]:
-    """ξ of a computed motion, which is run again with it; raises InputError for a known one without attitude."""
-    if isinstance(run, Reference):
-        raise InputError("This reference has no attitude.", "Ask for it: heavytop.reference(..., attitude=True).")
+def _with_attitude(run: Trajectory) -> Trajectory:
+    """The motion with its attitude, integrated again for it."""
     problem = run.problem
     top, start = problem.given or (problem.top, problem.start)
     start = start.normalized()
@@ -144,10 +140,8 @@ def _integrated_xi(run: Motion) -> NDArray[np.float64]:
             f"The attitude could not be integrated: {again.outcome.message}.",
             "Give the run with xi=, as propagate takes.",
         )
-    xi = samples(again).xi
-    assert xi is not None
-    turn = axes_of(run)
-    return (xi if turn is None else xi @ turn.T)[: len(run.states)]
+    carried = again if run.frame is None else framed(again, run.frame)
+    return replace(run, problem=again.problem, attitude=carried.states[: len(run.states), 6:])
 
 
 def axes_of(run: Motion) -> NDArray[np.float64] | None:
@@ -198,7 +192,7 @@ def path_in_space(run: Any, of: str | None, top: HeavyTop | None) -> tuple[str, 
     if of == "vertical":
         return of, drawn, drawn.gamma
     name, vector = direction(run, of, top)
-    return name, drawn, drawn.rows() @ vector
+    return name, drawn, drawn.rotations() @ vector
 
 
 def compared(run: Any, known: Any) -> tuple[Problem, list[Fraction], list[list[Fraction]], list[list[Fraction]]]:

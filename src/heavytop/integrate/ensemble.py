@@ -13,8 +13,8 @@ import numpy
 
 from heavytop.errors import InputError
 from heavytop.guard import processors
-from heavytop.integrate.heyoka.engines import compiled
-from heavytop.integrate.heyoka.lanes import Lanes, Work
+from heavytop.integrate.heyoka.engines import Compiled, compiled
+from heavytop.integrate.heyoka.lanes import LaneIntegrator, Lanes, Work
 from heavytop.integrate.heyoka.motions import integrate_to_samples
 from heavytop.integrate.trajectory import EnsembleObserver, Finished, Problem, Trajectory
 from heavytop.precision import DOUBLE, OrderedRing, exact, number, require
@@ -56,8 +56,10 @@ def propagate_ensemble(
         raise InputError(f"{lanes} lanes make no ensemble.", "Use 2 lanes or more.")
     batch = first.precision == DOUBLE and work.moves
     width = lanes if batch else None
-    work.tool = compiled(first.system, first.precision, attitude=first.xi is not None, lanes=width, **options)
-    return in_threads(partial(_in_lanes if batch else _one_by_one, work), work, threads, width or 1, observer, finished)
+    tool = compiled(first.system, first.precision, attitude=first.xi is not None, lanes=width, **options)
+    work.lanes = LaneIntegrator("heyoka:batch", tool.engine.order, tool.seconds, tool.flags)
+    run = partial(_in_lanes if batch else _one_by_one, work, tool)
+    return in_threads(run, work, threads, width or 1, observer, finished)
 
 
 def work_of(
@@ -67,7 +69,7 @@ def work_of(
     first = one_kind(problems)
     targets = [number(time, require(first.precision)) for time in check_times(times)]
     pending = deque(enumerate(problems))
-    return first, Work(None, targets, [exact(t) for t in targets], step_limit, observer is not None, pending)
+    return first, Work(targets, [exact(t) for t in targets], step_limit, observer is not None, pending)
 
 
 def in_threads(
@@ -129,19 +131,19 @@ def _in_pool(run: Callable[[], None], work: Work, threads: int, receive: Callabl
             work.stop.set()
 
 
-def _in_lanes(work: Work) -> None:
+def _in_lanes(work: Work, tool: Compiled) -> None:
     """One thread of a batch ensemble."""
-    with work.tool.borrowed() as mover, work.tool.borrowed() as sampler, numpy.errstate(all="ignore"):
+    with tool.borrowed() as mover, tool.borrowed() as sampler, numpy.errstate(all="ignore"):
         Lanes(work, mover, sampler).run()
 
 
-def _one_by_one(work: Work) -> None:
+def _one_by_one(work: Work, tool: Compiled) -> None:
     """One thread of scalar runs."""
-    with work.tool.borrowed() as engine:
+    with tool.borrowed() as engine:
         while taken := work.take():
             index, problem = taken
             observer = partial(work.observe, index) if work.observed else None
-            run = integrate_to_samples(work.tool, engine, problem, work.targets, work.step_limit, observer, work.check)
+            run = integrate_to_samples(tool, engine, problem, work.targets, work.step_limit, observer, work.check)
             work.finish(index, run)
 
 

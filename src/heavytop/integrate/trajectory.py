@@ -232,9 +232,9 @@ class Problem:
         p = self.parameters
         return HeavyTop(p.inertia, 1, p.moment, p.rotor if self.system is HEAVY_GYROSTAT else None)
 
-    @classmethod
+    @staticmethod
+    @cache_last_call
     def of(
-        cls,
         top: HeavyTop,
         start: State,
         precision: Precision,
@@ -242,26 +242,20 @@ class Problem:
         xi: tuple[Fraction, ...] | None = None,
     ) -> Problem:
         """The problem rounded to ``precision``; the rotor is computed from the exact data first."""
-        return _rounded(top, start, precision, system, xi)
+
+        def nearest(values: Any) -> tuple[Fraction, ...]:
+            return tuple(rounded(value, precision) for value in values)
+
+        # of the gyrostat the start is part of them
+        parameters = _rounded_parameters(top, start if system is GYROSTAT else None, precision, system)
+        rounded_start = State(nearest(start.omega), nearest(start.gamma))
+        return Problem(system, precision, parameters, rounded_start, None if xi is None else nearest(xi), (top, start))
 
     def native(self, values: Any) -> list[Any]:
         """Numbers that are rounded to the format, as numbers of it."""
         if self.precision.family == "double":
             return [float(value) for value in values]
         return [number(exact(value), self.precision) for value in values]
-
-
-@cache_last_call
-def _rounded(
-    top: HeavyTop, start: State, precision: Precision, system: System, xi: tuple[Fraction, ...] | None
-) -> Problem:
-    def both(values: Any) -> tuple[Fraction, ...]:
-        return tuple(rounded(value, precision) for value in values)
-
-    # of the gyrostat the start is part of them
-    parameters = _rounded_parameters(top, start if system is GYROSTAT else None, precision, system)
-    rounded_start = State(both(start.omega), both(start.gamma))
-    return Problem(system, precision, parameters, rounded_start, None if xi is None else both(xi), (top, start))
 
 
 @cache_last_call

@@ -38,22 +38,31 @@ class StoppedError(Exception):
     """The ensemble was abandoned: another thread failed, or the user interrupted."""
 
 
+class LaneIntegrator(NamedTuple):
+    """An integrator that computes motions in lanes, as their trajectories name it.  seconds: of compiling."""
+
+    name: str
+    order: int
+    seconds: float
+    flags: dict[str, str]
+
+
 @dataclass(slots=True)
 class Work:
     """The work that the threads of an ensemble share.
 
-    tool: of the integrator.  targets: native times in order; times: their exact values.  pending: problems that no
-    thread has taken yet.  send: hands a sample, of which as many may be on their way as there is room for, or a motion
-    that ended to the thread that observes.
+    targets: native times in order; times: their exact values.  pending: problems that no thread has taken yet.
+    send: passes a sample, or a motion that ended, to the thread that observes.  room: for samples on their way.
+    lanes: by which integrator motions in lanes are computed.
     """
 
-    tool: Any
     targets: list[Any]
     times: list[Fraction]
     step_limit: int | None
     observed: bool
     pending: deque[tuple[int, Problem]]
     stop: Event = field(default_factory=Event)
+    lanes: LaneIntegrator = field(init=False)
     send: Callable[[Any], None] = field(init=False)
     room: Semaphore = field(default_factory=lambda: Semaphore(_ROOM))
 
@@ -84,21 +93,12 @@ class Work:
         else:
             run.states.append(state)
 
-    def end(
-        self,
-        run: LaneRun,
-        integrator: str,
-        outcome: Outcome,
-        reached: Fraction,
-        steps: int,
-        order: int,
-        compiling: float,
-        flags: dict[str, str],
-    ) -> None:
-        """Hand in a motion of a lane; reached: its time, unless it came to its last sample."""
+    def end(self, run: LaneRun, outcome: Outcome, reached: Fraction, steps: int) -> None:
+        """Hand in a motion of a lane; reached: its last time, unless it reached its last sample."""
+        name, order, compiling, flags = self.lanes
         ended = Trajectory(
             run.problem,
-            integrator,
+            name,
             tuple(run.times),
             tuple(run.states),
             outcome,
@@ -309,7 +309,7 @@ class Lanes:
             run = sample.run
             self.work.keep(run, state)
             if len(run.times) == len(self.work.times):
-                self._finish(run, Outcome.SUCCESS, Fraction(0), int(sample.before.steps[sample.lane]) + steps)
+                self.work.end(run, Outcome.SUCCESS, Fraction(0), int(sample.before.steps[sample.lane]) + steps)
 
     def _stop(self, lane: int, outcome: Outcome, time: OrderedRing, steps: Any, rest: Any = None) -> None:
         """End the run in the lane; SUCCESS where it is an equilibrium, ``rest``."""
@@ -318,12 +318,8 @@ class Lanes:
         if run := self.runs[lane]:
             while outcome is Outcome.SUCCESS and len(run.times) < len(self.work.times):
                 self.work.keep(run, rest.copy())
-            self._finish(run, outcome, Fraction(0) if outcome is Outcome.SUCCESS else exact(time), int(steps))
+            self.work.end(run, outcome, Fraction(0) if outcome is Outcome.SUCCESS else exact(time), int(steps))
         self._load(lane)
-
-    def _finish(self, run: _Run, outcome: Outcome, reached: Fraction, steps: int) -> None:
-        tool = self.work.tool
-        self.work.end(run, "heyoka:batch", outcome, reached, steps, self.mover.order, tool.seconds, tool.flags)
 
 
 # Many short motions of one system at the same times, as arrays: heyoka's lanes, one call for eight motions.

@@ -20,7 +20,7 @@ import numpy
 from numpy.typing import NDArray
 
 from heavytop.integrate.ensemble import in_threads, work_of
-from heavytop.integrate.heyoka.lanes import LaneRun, Work
+from heavytop.integrate.heyoka.lanes import LaneIntegrator, LaneRun, Work
 from heavytop.integrate.multiword.engines import DoubleDouble, choose, compiled_lanes, floats, wanted_tolerance
 from heavytop.integrate.multiword.motions import (
     CHUNK_SECONDS,
@@ -83,15 +83,11 @@ def first_low_order(arithmetic: DoubleDouble) -> int:
 
 @dataclass(slots=True)
 class WordsLanes:
-    """The eight lanes of a thread.
-
-    seconds: of compiling.  others: where problems go that need another arithmetic.
-    """
+    """The eight lanes of a thread.  others: problems that need another arithmetic."""
 
     work: Work
     arithmetic: DoubleDouble
     tolerance: Fraction | None
-    seconds: float
     others: deque[tuple[int, Problem]] = field(default_factory=deque)
     lanes: dict[int, _Motion] = field(default_factory=dict)
     waiting: deque[_Motion] = field(default_factory=deque)
@@ -143,7 +139,7 @@ class WordsLanes:
                 return motion
             for _ in self.work.times:
                 self.work.keep(motion, motion.exactly(scaled.state))
-            self._finish(motion, Outcome.SUCCESS, Fraction(0), 0)
+            self.work.end(motion, Outcome.SUCCESS, Fraction(0), 0)
         return None
 
     def _aim(self, eight: Eight, lane: int) -> None:
@@ -194,14 +190,7 @@ class WordsLanes:
         motion = self.lanes.pop(lane)
         eight.empty(lane)
         sign = 1 if self.forwards else -1
-        self._finish(motion, outcome, sign * eight.time(lane) / motion.scaled.rate, steps)
-
-    def _finish(self, motion: _Motion, outcome: Outcome, reached: Fraction, steps: int) -> None:
-        schedule = self.arithmetic.in_lanes
-        rule = f"radius of convergence times 2^{schedule.reach:.3f}, ten bits"
-        own = {"lanes": str(LANES), "order": str(schedule.order), "step_rule": rule}
-        flags = self.arithmetic.flags | own
-        self.work.end(motion, "multiword", outcome, reached, steps, schedule.order, self.seconds, flags)
+        self.work.end(motion, outcome, sign * eight.time(lane) / motion.scaled.rate, steps)
 
 
 # Many motions in multi-word arithmetic: eight in lanes where double-double serves, threads on top.
@@ -230,14 +219,18 @@ def propagate_multiword_ensemble(
     first, work = work_of(problems, times, step_limit, observer)
     arithmetic = floats(wanted_tolerance(first.precision, tolerance))
     if arithmetic is not None and first.xi is None and work.moves:
-        run = partial(_in_lanes, work, arithmetic, tolerance, compiled_lanes(first.system))
+        schedule = arithmetic.in_lanes
+        rule = f"radius of convergence times 2^{schedule.reach:.3f}, ten bits"
+        flags = arithmetic.flags | {"lanes": str(LANES), "order": str(schedule.order), "step_rule": rule}
+        work.lanes = LaneIntegrator("multiword", schedule.order, compiled_lanes(first.system), flags)
+        run = partial(_in_lanes, work, arithmetic, tolerance)
         return in_threads(run, work, threads, LANES, observer, finished)
     return in_threads(lambda: _alone(work, tolerance, iter(work.take, None)), work, threads, 1, observer, finished)
 
 
-def _in_lanes(work: Work, arithmetic: DoubleDouble, tolerance: Fraction | None, seconds: float) -> None:
-    """One thread of lanes, and afterwards those that need another arithmetic."""
-    lanes = WordsLanes(work, arithmetic, tolerance, seconds)
+def _in_lanes(work: Work, arithmetic: DoubleDouble, tolerance: Fraction | None) -> None:
+    """One thread of lanes, and afterwards the problems that need another arithmetic."""
+    lanes = WordsLanes(work, arithmetic, tolerance)
     lanes.run()
     _alone(work, tolerance, lanes.others)
 
