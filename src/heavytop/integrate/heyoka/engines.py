@@ -31,10 +31,10 @@ from heavytop.precision import (
 )
 from heavytop.top.equations import HEAVY_GYROSTAT, VARIABLES, Parameters, System
 
-# A compiled integrator takes one step that is known before it takes any other.
+# The known step, which a compiled integrator takes before any other.
 #
-# Machine code can be damaged on its way: in a cache on disk, in memory.  The known step starts from integers for which
-# every derivative of the motion is an integer again, so that it is known exactly, from the field alone.
+# Machine code can be damaged in a cache on disk or in memory.  The known step starts from integers for which every
+# derivative of the motion is an integer, so that it is known exactly, from the field alone.
 
 
 # Ω in multiples of I1 I2 I3 and γ in multiples of its square keep every division by a moment whole
@@ -52,9 +52,9 @@ Exact = int | Fraction
 
 
 class Jet:
-    """A quantity by its derivatives at t = 0, exact: a ring in which the fields can be evaluated.
+    """A function of time by its exact derivatives at t = 0: a ring in which the fields can be evaluated.
 
-    at: the n-th derivative, for n in turn.
+    at: gives the n-th derivative; n = 0, 1, ... in turn.
     """
 
     def __init__(self, at: Callable[[int], Exact]) -> None:
@@ -104,10 +104,10 @@ def derivatives(system: System, attitude: bool, count: int, p: Parameters | None
 
 
 def check(engine: Any, system: System, precision: Precision, constants: Parameters | None = None) -> None:
-    """One step of a compiled integrator, scalar or batch, compared with what is known; its time and state are reset.
+    """Compare the known step of a compiled integrator, scalar or batch, with its exact values; then reset the engine.
 
-    Taylor coefficients (the first 100) against the exact ones; the length of the step against Jorba and Zou's rule;
-    the new state and the dense output against the polynomial summed here.  Raises Contradiction.
+    The first 100 Taylor coefficients are compared with the exact ones, the step size with Jorba and Zou's rule, the new
+    state and the dense output with the polynomial summed here.  Raises Contradiction.
     constants: exact parameters that were compiled in; None where the engine takes any.
     """
     p = constants or known_parameters(system)
@@ -136,16 +136,16 @@ def check(engine: Any, system: System, precision: Precision, constants: Paramete
                 (_COEFFICIENT_EPS + n * _COEFFICIENT_EPS_AN_ORDER) * eps * max(abs(Fraction(value)) for value in column)
             )
             for computed, value in zip(coefficients[:, n], column, strict=True):
-                off = abs(_number(computed) * factorial(n) - value)
-                _require(off <= limit, f"Taylor coefficient {n}", precision)
+                error = abs(_number(computed) * factorial(n) - value)
+                _require(error <= limit, f"Taylor coefficient {n}", precision)
         expected = _length_of_step(coefficients, order)
         _require(abs(float(h) / expected - 1) < max(_STEP_ERROR, 32 * float(eps)), "the length of the step", precision)
-        for what, result, time in (("the step", engine.state[at], h), ("the dense output", dense[at], h * half)):
+        for name, result, time in (("the step", engine.state[at], h), ("the dense output", dense[at], h * half)):
             total = coefficients[:, order]
             for n in reversed(range(order)):
                 total = total * time + coefficients[:, n]
             limit = _SUM_EPS * number(eps, precision) * max(abs(value) for value in total)
-            _require(all(abs(a - b) <= limit for a, b in zip(result, total, strict=True)), what, precision)
+            _require(all(abs(a - b) <= limit for a, b in zip(result, total, strict=True)), name, precision)
     _reset(engine, precision)
 
 
@@ -159,7 +159,7 @@ def _reset(engine: Any, precision: Precision) -> None:
 
 
 def _number(value: Any) -> Fraction:
-    """Exact; what is not finite as a number that is wrong everywhere."""
+    """The exact value; of a number that is not finite, one that agrees with nothing."""
     return exact(value) if numpy.isfinite(value) else Fraction(10) ** 9999
 
 
@@ -174,8 +174,8 @@ def _length_of_step(coefficients: Any, order: int) -> float:
     return exp(min((size(0) - size(n)) / n for n in (order - 1, order)) - 2 - 0.7 / (order - 1))
 
 
-def _require(fine: bool, what: str, precision: Precision) -> None:
-    if not fine:
+def _require(agrees: bool, what: str, precision: Precision) -> None:
+    if not agrees:
         raise Contradiction(
             f"A compiled integrator for {precision.name} gives a wrong value in a step that is known: {what}.",
             "Its machine code is damaged: run again; if it stays, this machine or heyoka is faulty.",
@@ -187,9 +187,9 @@ _XI = ("xi1", "xi2", "xi3")
 
 @dataclass(slots=True)
 class Compiled:
-    """A compiled integrator of one system and format, used again for every top.
+    """A compiled integrator of one system and format, reused for every top.
 
-    engine: never run, only copied, so that a copy can be made while others run.  spare: copies that nobody uses now.
+    engine: never run, only copied, so that a copy can be made while others run.  spare: idle copies.
     """
 
     engine: Any
@@ -200,9 +200,9 @@ class Compiled:
 
     @contextmanager
     def borrowed(self) -> Iterator[Any]:
-        """A copy of the engine for one run, given back at the end, also of a run that raises.
+        """A copy of the engine for one run, returned at its end, also where it raises.
 
-        Whoever runs meanwhile, another thread or an observer of this very run, has another copy.
+        A run that starts meanwhile, in another thread or in an observer of this run, has another copy.
         """
         engine = self.take()
         try:
@@ -211,7 +211,7 @@ class Compiled:
             self.spare.append(engine)
 
     def take(self) -> Any:
-        """A copy that is to be given back to ``spare``: :meth:`borrowed` for who counts microseconds."""
+        """A copy that the caller returns to ``spare``: :meth:`borrowed` without the cost of a context manager."""
         try:
             return self.spare.pop()
         except IndexError:
@@ -231,7 +231,7 @@ def expressions(system: System, attitude: bool, constants: Parameters | None = N
     """The field as heyoka expressions with par[0..2] = I and par[3..5] = P r, or par[3] = λ for the gyrostat; par[6..8]
     = k for the heavy gyrostat.
 
-    constants: doubles in the place of all par[i].
+    constants: doubles in place of par[i].
     """
     heyoka = import_heyoka()
 
@@ -259,12 +259,11 @@ def compiled(
 
     constants: exact parameters of one top, compiled into the code, in double only (heyoka demotes all constants to it);
     None for code that serves every top.
-
-    lanes: that many motions at once in SIMD lanes, in double only; None for a scalar integrator, whose bits differ.
+    lanes: how many motions run at once in SIMD lanes, in double only; None for a scalar integrator, whose bits differ.
     tolerance: None for the format's eps.  compact_mode: None for off in double and extended (faster to run) and on in
     quad and real (else they take minutes to compile).
 
-    Raises Contradiction where its first step, which is known, is wrong.
+    Raises Contradiction where the known step is wrong.
     """
     compact = precision.family in ("quad", "real") if compact_mode is None else compact_mode
     return build(system, precision, attitude, tolerance, high_accuracy, compact, lanes, constants)
@@ -309,12 +308,12 @@ def build(
 
 
 def _count(system: System) -> int:
-    """How many numbers enter the field."""
+    """The number of parameters that enter the field."""
     return len(system.entering(Parameters((1, 1, 1), (0, 0, 0), (0, 0, 0) if system is HEAVY_GYROSTAT else 0)))
 
 
 def _flags(engine: Any) -> dict[str, str]:
-    """Everything that can change bits."""
+    """All that can change bits."""
     code = engine.llvm_state
     values = {
         "tolerance": engine.tol,
@@ -343,11 +342,11 @@ def load(engine: Any, problem: Problem) -> None:
 
 @cache_last_call
 def arrays(problem: Problem) -> tuple[Any, Any]:
-    """The parameters and the state that an engine is given, as native arrays."""
+    """The parameters and the initial state of an engine, as native arrays."""
     p = problem.parameters
     numbers = list(problem.system.entering(p))
     start = [*problem.start.flat, *(problem.xi or ())]
     columns = numpy.array(problem.native(numbers)), numpy.array(problem.native(start))
     for array in columns:
-        array.setflags(write=False)  # kept for the next who asks
+        array.setflags(write=False)  # cached, and shared
     return columns

@@ -1,8 +1,8 @@
 """Motions side by side in the SIMD lanes of a batch engine.
 
-The lanes step together, each by its own step, and none waits for a sample.  A sample that a lane has passed is taken
-afterwards by a second engine: from a copy of the lane made before it, by the same steps, only the last one cut short.
-So no bit depends on the samples, on how many steps are taken between two looks, or on the other lanes.
+The lanes step together, each by its own step size, and none waits for a sample.  A sample that a lane has passed is
+computed afterwards by a second engine, which repeats the steps from a copy of the lane made before it and cuts the last
+one short.  So no bit depends on the samples, on how many steps are taken between two checks, or on the other lanes.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, OrderedRing, exact
 from heavytop.top.equations import System
 
-# steps between two looks near a sample; a look costs as much as about ten
+# steps between two checks near a sample; a check costs as much as about ten
 _WINDOW = 64
 # samples that may wait for the observer
 _ROOM = 1000
@@ -68,7 +68,7 @@ class Work:
 
     @property
     def moves(self) -> bool:
-        """Whether any step is asked for."""
+        """Whether the request needs any step."""
         return bool(self.targets[-1] != 0) and (self.step_limit is None or self.step_limit > 0)
 
     def take(self) -> tuple[int, Problem] | None:
@@ -79,13 +79,13 @@ class Work:
             return None
 
     def observe(self, index: int, time: Fraction, state: Any) -> None:
-        """Send one sample to the observer; wait for it if it is far behind."""
+        """Send one sample to the observer; wait while it is far behind."""
         while not self.room.acquire(timeout=CHUNK_SECONDS):
             self.check()
         self.send((index, time, state))
 
     def keep(self, run: LaneRun, state: Any) -> None:
-        """Send the run's next sample to the observer, or keep it."""
+        """Send the run's next sample to the observer, or store it."""
         time = self.times[len(run.times)]
         run.times.append(time)
         if self.observed:
@@ -111,7 +111,7 @@ class Work:
         self.finish(run.index, ended)
 
     def finish(self, index: int, run: Trajectory) -> None:
-        """Hand in a motion that ended, behind its samples."""
+        """Hand in a motion that ended, after its samples."""
         self.send((index, run))
 
     def check(self) -> None:
@@ -133,14 +133,14 @@ class LaneRun:
 
 @dataclass(slots=True, eq=False)
 class _Run(LaneRun):
-    """A run in a lane, or out of it and waiting for its last samples.  asked: how many samples it has passed."""
+    """A run in a lane, or out of it and waiting for its last samples.  passed: how many samples lie behind it."""
 
     parameters: Any
-    asked: int = 0
+    passed: int = 0
 
 
 class _Ends(NamedTuple):
-    """The last step ends of all lanes: states (n, lanes), both words of the times, steps taken."""
+    """The lanes at the end of a step: states (n, lanes), both words of the times, steps taken."""
 
     states: NDArray[numpy.float64]
     high: NDArray[numpy.float64]
@@ -149,7 +149,7 @@ class _Ends(NamedTuple):
 
 
 class _Sample(NamedTuple):
-    """A sample to be taken at ``target``, by steps from where that lane was before it."""
+    """A sample to be computed at ``target``, by steps from the state of its lane before it."""
 
     run: _Run
     target: OrderedRing
@@ -158,7 +158,7 @@ class _Sample(NamedTuple):
 
 
 class Lanes:
-    """The lanes of a thread; each takes the next problem as soon as its own is over.
+    """The lanes of a thread; each takes the next problem when its own has ended.
 
     mover and sampler: two copies of the batch engine.
     """
@@ -210,13 +210,13 @@ class Lanes:
         self.fresh = True
 
     def _advance(self) -> None:
-        """Some steps of every lane, and what follows from them."""
+        """Take some steps of every lane; note samples that were passed and lanes that ended."""
         mover = self.mover
         high, low = mover.dtime
         before = _Ends(mover.state.copy(), high.copy(), low.copy(), self.steps.copy())
         count = self._count()
         if count > 1 and not self._several(count):
-            # over the same ground again, by halves, until the step that fails is a single one
+            # repeat by halves until the step that fails is a single one
             mover.state[:] = before.states
             mover.set_dtime(before.high, before.low)
             self.unverified = count
@@ -239,7 +239,7 @@ class Lanes:
                 self._stop(lane, Outcome.STEP_LIMIT, mover.time[lane], self.steps[lane])
 
     def _count(self) -> int:
-        """How many steps to take at once: nearly as far as the nearest sample, a quarter of a second at the most."""
+        """How many steps to take at once: nearly up to the nearest sample, at most a quarter of a second of them."""
         if self.fresh:
             return 1
         ahead = self.direction * self.mover.time
@@ -252,7 +252,7 @@ class Lanes:
         return int(count)
 
     def _several(self, count: int) -> bool:
-        """Many steps at once; False if in one of them a lane failed, or its time may not have moved."""
+        """Take ``count`` steps at once; False if a lane failed in one of them, or its time may not have moved."""
         began = perf_counter()
         self.mover.propagate_until(self.direction * _FAR, max_steps=count)
         self.seconds_per_step = (perf_counter() - began) / count
@@ -262,7 +262,7 @@ class Lanes:
         return not_finite() not in outcomes and bool(moved.all())
 
     def _single(self, before: _Ends) -> dict[int, Outcome]:
-        """One step; the lanes that failed in it, with SUCCESS for those at rest."""
+        """Take one step; returns the lanes that failed in it, with SUCCESS for those at rest."""
         mover, bad = self.mover, not_finite()
         (mover.step if self.direction > 0 else mover.step_backward)(write_tc=True)
         failed = {}
@@ -281,19 +281,19 @@ class Lanes:
         return failed
 
     def _passed(self, lane: int, ahead: Any, before: _Ends) -> None:
-        """Note the samples that the lane has passed; after the last one another problem takes its place."""
+        """Note the samples that the lane has passed; after the last one, load the next problem."""
         run = self.runs[lane]
         assert run is not None
-        while run.asked < len(self.targets) and ahead >= abs(target := self.targets[run.asked]):
+        while run.passed < len(self.targets) and ahead >= abs(target := self.targets[run.passed]):
             self.samples.append(_Sample(run, target, lane, before))
-            run.asked += 1
-        if run.asked < len(self.targets):
-            self.distance[lane] = abs(self.targets[run.asked])
+            run.passed += 1
+        if run.passed < len(self.targets):
+            self.distance[lane] = abs(self.targets[run.passed])
         else:
             self._load(lane)
 
     def _take_samples(self) -> None:
-        """Take the oldest samples, as many as there are lanes; a run whose last one is among them is done."""
+        """Compute the oldest samples, as many as there are lanes; a run whose last one is among them ends."""
         batch = [self.samples.popleft() for _ in range(min(self.lanes, len(self.samples)))]
         padded = batch + batch[:1] * (self.lanes - len(batch))
         sampler = self.sampler
@@ -311,13 +311,13 @@ class Lanes:
             if len(run.times) == len(self.work.times):
                 self.work.end(run, Outcome.SUCCESS, Fraction(0), int(sample.before.steps[sample.lane]) + steps)
 
-    def _stop(self, lane: int, outcome: Outcome, time: OrderedRing, steps: Any, rest: Any = None) -> None:
-        """End the run in the lane; SUCCESS where it is an equilibrium, ``rest``."""
+    def _stop(self, lane: int, outcome: Outcome, time: OrderedRing, steps: Any, equilibrium: Any = None) -> None:
+        """End the run in the lane; SUCCESS where it stays at ``equilibrium``."""
         while self.samples:
             self._take_samples()
         if run := self.runs[lane]:
             while outcome is Outcome.SUCCESS and len(run.times) < len(self.work.times):
-                self.work.keep(run, rest.copy())
+                self.work.keep(run, equilibrium.copy())
             self.work.end(run, outcome, Fraction(0) if outcome is Outcome.SUCCESS else exact(time), int(steps))
         self._load(lane)
 
@@ -338,31 +338,31 @@ def states_on_a_grid(
     times: Sequence[Fraction],
     **options: Any,
 ) -> tuple[Any, Any, Any]:
-    """States (motions, samples, 6), steps (motions,) and which of the motions they are good for.
+    """States (motions, samples, 6), steps (motions,), and for each motion whether they are valid.
 
     parameters: (motions, k), doubles that enter the field.  starts: (motions, 6).  times: doubles, increasing from
-    above 0.  options: tolerance.  A motion is not good where it, or one of the seven beside it, did anything but get
-    there in steps that move its time.
+    above 0.  options: tolerance.  The states are valid where this motion and the seven beside it reached the last time
+    by steps that move their time.
     """
     heyoka = import_heyoka()
 
     tool = compiled(system, DOUBLE, lanes=LANES, **options)
     count, ends = len(starts), numpy.array([0.0, *map(float, times)])
     grid = numpy.repeat(ends[:, None], LANES, axis=1)
-    least = numpy.spacing(ends[-1])
+    spacing = numpy.spacing(ends[-1])
     states = numpy.full((count, len(times), 6), numpy.nan)
     steps, good = numpy.zeros(count, int), numpy.zeros(count, bool)
     with tool.borrowed() as engine, numpy.errstate(all="ignore"):
         for first in range(0, count, LANES):
-            places = numpy.minimum(numpy.arange(first, first + LANES), count - 1)
+            indices = numpy.minimum(numpy.arange(first, first + LANES), count - 1)
             engine.set_time(0.0)
-            engine.pars[:] = parameters[places].T
-            engine.state[:] = starts[places].T
+            engine.pars[:] = parameters[indices].T
+            engine.state[:] = starts[indices].T
             grid_run = engine.propagate_grid(grid)
             results = engine.propagate_res
             reached = heyoka.taylor_outcome.time_limit
-            moved = all(result[0] == reached and 2 * result[1] > least for result in results)
-            states[places] = (grid_run[1] if isinstance(grid_run, tuple) else grid_run)[1:].transpose(2, 0, 1)
-            steps[places] = [result[3] for result in results]
-            good[places] = moved and numpy.isfinite(states[places]).all()
+            moved = all(result[0] == reached and 2 * result[1] > spacing for result in results)
+            states[indices] = (grid_run[1] if isinstance(grid_run, tuple) else grid_run)[1:].transpose(2, 0, 1)
+            steps[indices] = [result[3] for result in results]
+            good[indices] = moved and numpy.isfinite(states[indices]).all()
     return states, steps, good

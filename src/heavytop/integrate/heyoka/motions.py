@@ -1,4 +1,4 @@
-"""Motions computed by heyoka: from a start to the times that are asked for."""
+"""Motions computed by heyoka at requested times."""
 
 from __future__ import annotations
 
@@ -31,23 +31,26 @@ from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
 
 # One run of a compiled integrator, step by step.
 #
-# Runs are cut by steps, never by times: a sample is taken from the Taylor polynomial of the step that covers it, so the
-# steps and all later bits do not depend on which samples were asked for, nor on how often the run gave way to Ctrl-C.
+# No step is cut at a sample: the state there is that of the Taylor polynomial of the step that covers it.  So the steps
+# and all later bits depend neither on the requested times nor on how often the run paused for Ctrl-C.
 
 
 CHUNK_SECONDS = 0.25
 _ON_A_GRID = ("double", "extended", "quad")
 _MANY, _CLOSE = 256, 20
-"""States at so many times, of which so many steps lie between two at most, are computed in one call of heyoka."""
+"""States at so many times, with at most so many steps between two of them, are computed in one call of heyoka."""
 _GROWTH = 16
-"""Times the steps so far: more are not taken at once, since few steps say little of the longest."""
+"""At most so many times the steps so far are taken at once: few steps say little about the longest."""
 _SLOWEST, _FASTEST = Fraction(1, 2**48), Fraction(2) ** 55
-"""Rates within which no Taylor coefficient of double is 0 or infinite for its size alone."""
+"""Rates between which no Taylor coefficient leaves the exponent range of double."""
 
 
 @dataclass(slots=True)
 class Stepper(SampledRun):
-    """One run of a compiled integrator, advanced step by step to wherever the next sample lies."""
+    """One run of a compiled integrator, advanced step by step to the next sample.
+
+    far: a time beyond every other.  rest: the state, where it is an equilibrium.
+    """
 
     engine: Any
     forwards: bool
@@ -94,7 +97,7 @@ class Stepper(SampledRun):
         return int(count)
 
     def single(self) -> Outcome:
-        """One step, whose polynomial is then at hand."""
+        """Take one step, whose polynomial is then available."""
         engine = self.engine
         state, before, began = engine.state.copy(), engine.dtime, perf_counter()
         self._before = state, before, self.steps
@@ -125,9 +128,9 @@ class Stepper(SampledRun):
             self.engine.state[:] = state
             self.engine.dtime = time
             if failed:
-                # over the same ground again, one by one, to find where
+                # repeat one by one, to find the step that fails
                 self._one_by_one = True
-            else:  # steps that grow: half as long again is soon long enough
+            else:  # the steps grow
                 self._largest_step *= 1.5
             return Outcome.SUCCESS
         self.steps, self.time = self.steps + done, self.engine.time
@@ -139,7 +142,7 @@ class Stepper(SampledRun):
         return self.engine.tc.copy()
 
     def take_up(self, resume_point: ResumePoint, covered: Any) -> None:
-        """Go on from there and take the step again that covers the last sample.
+        """Resume there: repeat the step that covers the last sample.
 
         Raises ValueError for a state of another length.
         """
@@ -153,7 +156,7 @@ class Stepper(SampledRun):
             resume_point.require_covered(self.steps)
 
     def place(self, samples: int, seconds: float, flags: dict[str, str]) -> ResumePoint:
-        """Where the last step began."""
+        """The resume point at the beginning of the last step."""
         state, time, steps = self._before
         return ResumePoint(samples, tuple(state), time, steps, seconds, flags)
 
@@ -168,9 +171,9 @@ class Stepper(SampledRun):
 def on_a_grid(engine: Any, targets: Sequence[Any], precision: Precision, most: int | None) -> tuple[int, Any] | None:
     """Steps taken from t = 0 to the last of ``targets``, and the states at all of them, an array of shape (n, 6 or 9).
 
-    The same bits as :class:`Stepper`, in one call of heyoka.  The grid goes on to a time beyond every other, so that no
-    step is cut; the run is stopped behind the step that covers the last target.  None for a run that ends otherwise, or
-    takes more than ``most`` steps: then the engine is anywhere.
+    The same bits as :class:`Stepper`, in one call of heyoka.  The grid ends at a time beyond every other, so that no
+    step is cut; the run stops after the step that covers the last target.  None for a run that ends otherwise, or takes
+    more than ``most`` steps: the state of the engine is then undefined.
     """
     last = targets[-1]
     if precision.family == "double":
@@ -184,7 +187,7 @@ def on_a_grid(engine: Any, targets: Sequence[Any], precision: Precision, most: i
             before, stepped = reached, (yield True)
         yield False
 
-    answers = proceed()  # at every step: to go on with a generator takes half as long as a call
+    answers = proceed()  # at every step: resuming a generator takes half as long as a call
     next(answers)
     end = far(bool(targets[-1] >= 0), precision)
     start = [] if targets[0] == 0 else [engine.time]
@@ -228,16 +231,16 @@ def propagate(
     """The motion from ``start`` at t = 0, at ``times``, computed by heyoka in ``precision``.
 
     times: exact numbers of one sign, strictly monotone away from 0 (0 itself may come first).
-    xi: exact initial attitude vector, to ride along.
+    xi: exact initial attitude vector, integrated too.
     step_limit: stop after that many steps; the times reached until then are returned.
-    observer: called with (exact time, native state) at each sample in place of keeping the states.
-    stepping: how steps are taken; another than heyoka's own is for trying the detectors.
-    place: where an earlier run of the same problem stopped; goes on behind its samples, to the same bits.
-    mark: called after each sample with the place from which this run could go on.
+    observer: called with (exact time, native state) at each sample in place of storing the states.
+    stepping: how steps are taken; another class than heyoka's own has a planted fault.
+    place: the resume point of an earlier run of the same problem; the run continues after it, to the same bits.
+    mark: called after each sample with the resume point there.
     tolerance, high_accuracy, compact_mode, constants: as in :func:`heavytop.integrate.heyoka.engines.compiled`.
 
     Raises InputError for times out of order, a format that the platform lacks, data outside its exponent range, a
-    start that the system does not admit, and a place reached with other flags.  A failed run is an outcome, not an
+    start that the system does not admit, and a resume point of other flags.  A failed run is an outcome, not an
     exception.
     """
     problem = Problem.of(top, start, precision, system, xi)
@@ -277,9 +280,9 @@ def integrate_to_samples(
     unit = _unit(problem)
     if unit != 1 and place is None and len(engine.pars):  # constants compiled in have the unit given
         scaled, factor = _in_unit(problem, unit), number(unit, problem.precision)
-        seen = observer and (lambda time, state: observer(time / unit, _from_unit(state, unit)))
+        unscaled = observer and (lambda time, state: observer(time / unit, _from_unit(state, unit)))
         run = integrate_to_samples(
-            tool, engine, scaled, [t * factor for t in targets], step_limit, seen, between, stepping=stepping
+            tool, engine, scaled, [t * factor for t in targets], step_limit, unscaled, between, stepping=stepping
         )
         times, states = tuple(time / unit for time in run.times), [_from_unit(state, unit) for state in run.states]
         return replace(
@@ -307,17 +310,17 @@ def integrate_to_samples(
 
 
 def _unit(problem: Problem) -> Fraction:
-    """1/unit of time in which a motion is integrated: its own, a power of 2, where a Taylor coefficient of double of
-    the order that heyoka takes, rate^20, is 0 or infinite in the time given; else 1.
+    """The power of 2 by which time is scaled for the integration: the rate of the motion where a Taylor coefficient of
+    double, rate^20 at heyoka's order, would be 0 or infinite; else 1.
     """
     if problem.precision.family != "double" or problem.precision.bits != DOUBLE.bits:
         return Fraction(1)
-    own = rate(problem.system, problem.parameters, problem.start.flat)
-    return Fraction(1) if not own or _SLOWEST < own < _FASTEST else own
+    scale = rate(problem.system, problem.parameters, problem.start.flat)
+    return Fraction(1) if not scale or _SLOWEST < scale < _FASTEST else scale
 
 
 def _in_unit(problem: Problem, unit: Fraction) -> Problem:
-    """The motion with the time times ``unit``; exact, but for what the format has no number."""
+    """The motion in the time t ``unit``; exact within the exponent range of the format."""
     p, rotors = problem.parameters, tuple(Fraction(value) / unit for value in problem.parameters.rotors)
     moment = tuple(Fraction(value) / unit**2 for value in p.moment)
     slower = Parameters(p.inertia, moment, rotors if isinstance(p.rotor, tuple) else rotors[0])
@@ -326,7 +329,7 @@ def _in_unit(problem: Problem, unit: Fraction) -> Problem:
 
 
 def _from_unit(state: Any, unit: Fraction) -> Any:
-    """A native state in the time given."""
+    """A native state in the units of the problem."""
     return numpy.concatenate([state[:3] * float(unit), state[3:]])
 
 
@@ -335,7 +338,7 @@ def states_at(
 ) -> tuple[Any, Outcome, Any, int]:
     """(states at the targets reached, outcome, time reached, steps), bit for bit as :func:`integrate_to_samples`.
 
-    For who has native numbers already: ``parameters`` and ``start`` as arrays, targets that were checked.
+    parameters, start: native arrays.  targets: native times, checked.
     """
 
     def begin() -> None:
@@ -361,9 +364,9 @@ def states_at(
 def _at_once(
     engine: Any, begin: Callable[[], None], targets: Sequence[Any], step_limit: int | None, precision: Precision
 ) -> tuple[int, Any] | None:
-    """Steps and states at many targets close to each other, in one call; None where there are few, or where it fails.
+    """Steps and states at many targets close to each other, in one call; None for few targets, and where it fails.
 
-    begin: sets the engine to the beginning, once to see how long the first step is, and once more.
+    begin: sets the engine to the beginning; called first to measure the first step, and again for the run.
     """
     if len(targets) < _MANY or precision.family not in _ON_A_GRID:
         return None
@@ -389,7 +392,7 @@ def first_steps(
     stepping: type[Stepper] = Stepper,
     **options: Any,
 ) -> tuple[Trajectory, list[TaylorStep]]:
-    """The steps that begin before the time ``until`` > 0, at their ends and as polynomials; none at an equilibrium.
+    """The steps that begin before the time ``until`` > 0: their ends and polynomials; none at an equilibrium.
 
     stepping: as in :func:`propagate`; options: as in :func:`heavytop.integrate.heyoka.engines.compiled`.
     """

@@ -1,4 +1,4 @@
-"""Which arithmetic serves a format and a tolerance, and its machine code, checked before it is used."""
+"""The arithmetic for a format and a tolerance, and its machine code, checked before it is used."""
 
 from __future__ import annotations
 
@@ -169,8 +169,8 @@ def wanted_tolerance(precision: Precision, tolerance: Fraction | None) -> Fracti
 def floats(wanted: Fraction, scaled: Scaled | None = None) -> DoubleDouble | None:
     """Double-double for a tolerance and a start, or for usual starts; None where more bits are needed.
 
-    A motion with very small components is computed as finely as those need it: fewer bits serve the Taylor coefficients
-    that are small beside the state, and an unstable axis would amplify what they lose.
+    Very small components of the state need more bits: the schedule computes Taylor coefficients that are small beside
+    the state in fewer, and an unstable axis would amplify their rounding errors.
     """
     tiny = 0 if scaled is None else fixed_point_run.spread(scaled)
     inner = wanted / 2**tiny if tiny > fixed_point_run.TINY_BITS else wanted
@@ -183,7 +183,7 @@ def floats(wanted: Fraction, scaled: Scaled | None = None) -> DoubleDouble | Non
 def choose(problem: Problem, tolerance: Fraction | None) -> tuple[Arithmetic, Scaled]:
     """The arithmetic for a format, or for the tolerance where one is given, and the problem in its units.
 
-    A grid is as fine as the smallest component needs it: what an unstable axis amplifies must be there.
+    A grid resolves the smallest component, which an unstable axis may amplify.
 
     Raises InputError for a tolerance outside 1e-6 to the format's own.
     """
@@ -202,9 +202,9 @@ def choose(problem: Problem, tolerance: Fraction | None) -> tuple[Arithmetic, Sc
 
 
 def accuracy(arithmetic: Arithmetic, scaled: Scaled) -> int:
-    """The bits of a number near 1 that a step gets right.
+    """The correct bits of a number near 1 after a step.
 
-    What a grid has for the smallest component of the start is not counted: numbers that float have it anyway.
+    The bits of a grid for the smallest component of the start are not counted: floating point has them anyway.
     """
     if isinstance(arithmetic, DoubleDouble):
         return ceil(1 / arithmetic.tolerance).bit_length() - 1

@@ -1,7 +1,7 @@
 """Motions in double-double, eight side by side in each thread.
 
-n0 is the same for all eight.  A motion that comes to need a larger one leaves its lane, and goes on from where it was
-among others with a larger one; so its bits depend on nothing but itself.
+n0 is the same for all eight.  A motion that needs a larger one leaves its lane and resumes among others with a larger
+n0; so its bits depend on nothing but itself.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _RISE = 2
 
 @dataclass(slots=True, eq=False)
 class _Motion(LaneRun):
-    """A problem on its way; instants: its exact times; moved: its words, between two eights."""
+    """A motion that is being computed.  instants: its exact times; moved: its words, between two groups of eight."""
 
     scaled: Scaled
     exponents: tuple[int, ...]
@@ -100,7 +100,7 @@ class WordsLanes:
         return bool(self.work.targets[-1] >= 0)
 
     def run(self) -> None:
-        """Until no problem is left, with n0 rising for those that outgrow it."""
+        """Run until no problem is left, with a larger n0 for those that need it."""
         low_order = first_low_order(self.arithmetic)
         while True:
             eight: Eight | None = None
@@ -112,7 +112,7 @@ class WordsLanes:
             low_order += _RISE
 
     def _fill(self, eight: Eight | None, low_order: int) -> Eight | None:
-        """Put a motion into every lane that has none, as long as there are any."""
+        """Put a motion into every idle lane, while there are any."""
         for lane in range(LANES):
             while lane not in self.lanes and (motion := self._next()) is not None:
                 if eight is None:
@@ -130,8 +130,8 @@ class WordsLanes:
             return self.waiting.popleft()
         while (taken := self.work.take()) is not None:
             index, problem = taken
-            own, scaled = choose(problem, self.tolerance)
-            if own != self.arithmetic:
+            arithmetic, scaled = choose(problem, self.tolerance)
+            if arithmetic != self.arithmetic:
                 self.others.append(taken)
                 continue
             motion = _Motion(index, problem, perf_counter(), scaled, scaled.exponents, self.work.times)
@@ -143,7 +143,7 @@ class WordsLanes:
         return None
 
     def _aim(self, eight: Eight, lane: int) -> None:
-        """The next time of the motion in a lane; at 0 it is there already.  Without one left it is over."""
+        """Set the next target of the motion in a lane; end the motion after its last sample."""
         motion = self.lanes[lane]
         if not motion.times and not motion.target:
             self.work.keep(motion, motion.exactly(motion.scaled.state))
@@ -154,13 +154,13 @@ class WordsLanes:
         eight.aim(lane, motion.target)
 
     def _round(self, eight: Eight) -> None:
-        """A chunk of steps, and whatever the lanes came to."""
+        """Take a chunk of steps; end or move motions, and sample where all lanes wait."""
         self.work.check()
         began = perf_counter()
         rounds = eight.advance(self.chunk)
-        a_round = (perf_counter() - began) / (rounds + 1)
+        seconds_per_round = (perf_counter() - began) / (rounds + 1)
         waiting = rounds < self.chunk
-        self.chunk = max(1, min(4 * self.chunk, int(CHUNK_SECONDS / a_round)))
+        self.chunk = max(1, min(4 * self.chunk, int(CHUNK_SECONDS / seconds_per_round)))
         for lane, motion in list(self.lanes.items()):
             status = eight.status(lane)
             if status is None:
@@ -176,7 +176,7 @@ class WordsLanes:
             self._sample(eight)
 
     def _sample(self, eight: Eight) -> None:
-        """The next time of every motion: each lane that is left waits for it."""
+        """Sample every motion at its target: all lanes wait there."""
         samples = eight.samples({lane: motion.target for lane, motion in self.lanes.items()})
         for lane, words in samples.items():
             motion = self.lanes[lane]
@@ -245,8 +245,7 @@ def _alone(work: Work, tolerance: Fraction | None, problems: Iterable[tuple[int,
 
 # Many short motions of heavy tops at the same times, as arrays: double-double in lanes, no exact number per motion.
 #
-# What the code above does motion by motion, for usual ones: doubles of moderate size,
-# forwards.
+# The computation above for usual motions: doubles of moderate size, forwards.
 
 
 _LARGE = 2.0**60
@@ -261,8 +260,7 @@ def double_double_states(
     tolerances: Sequence[Fraction],
     step_limit: int,
 ) -> list[tuple[Pairs, Any]]:
-    """States (motions, samples, 6) of heavy tops by each tolerance, and which motions they are good for: the others
-    need more care.
+    """States (motions, samples, 6) of heavy tops by each tolerance, and for each motion whether they are valid.
 
     parameters: doubles (motions, 6), I and n.  starts: (motions, 6).  times: doubles, increasing from above 0.
     """
@@ -282,8 +280,8 @@ class _Grid:
         gamma = _power_above(numpy.abs(starts[:, 3:]).max(axis=1))
         torque = numpy.abs(constants[3:, 0]).max(axis=0) * 2.0**gamma
         speed = numpy.abs(starts[:, :3]).max(axis=1)
-        turned, swung = _power_above(speed), -(-_power_above(torque) // 2)
-        rate = numpy.where(torque == 0, turned, numpy.where(speed == 0, swung, numpy.maximum(turned, swung)))
+        free, driven = _power_above(speed), -(-_power_above(torque) // 2)
+        rate = numpy.where(torque == 0, free, numpy.where(speed == 0, driven, numpy.maximum(free, driven)))
         self.exponents = numpy.stack([rate] * 3 + [gamma] * 3, axis=1)
         self.begin = numpy.ldexp(starts, -self.exponents)
         constants[3:] = numpy.ldexp(constants[3:], gamma - 2 * rate)
@@ -293,32 +291,32 @@ class _Grid:
         self.usual = self._are_usual()
 
     def _are_usual(self) -> Any:
-        """Motions of which double-double keeps every component, that do not rest."""
+        """Motions that are no equilibria and all of whose components double-double resolves."""
         state, constants = numpy.abs(self.begin), numpy.abs(self.constants[:, 0].T)
 
         def above(values: NDArray[numpy.float64], bits: int) -> Any:
             return ((values == 0) | (values > 2.0**-bits)).all(axis=1)
 
-        clear = above(state, TINY_BITS // 2 - 1) & above(constants, TINY_BITS // 2 - 1)
-        fine = above(state, TINY_BITS - 1) & ((state > 0).all(axis=1) | clear)
+        moderate = above(state, TINY_BITS // 2 - 1) & above(constants, TINY_BITS // 2 - 1)
+        resolved = above(state, TINY_BITS - 1) & ((state > 0).all(axis=1) | moderate)
         turning = numpy.abs(numpy.cross(self.begin[:, 3:], self.begin[:, :3])).max(axis=1) > _RESTING
         bounded = (constants < _LARGE).all(axis=1) & (numpy.abs(self.exponents) < 300).all(axis=1)
-        return fine & turning & bounded & numpy.isfinite(self.begin).all(axis=1)
+        return resolved & turning & bounded & numpy.isfinite(self.begin).all(axis=1)
 
     def run(self, tolerance: Fraction, step_limit: int) -> tuple[Pairs, Any]:
-        """The states by this tolerance, and the motions that they are good for."""
+        """The states by this tolerance, and for each motion whether they are valid."""
         arithmetic = floats(wanted_tolerance(DOUBLE_DOUBLE, tolerance))
         assert arithmetic is not None
-        self.good = numpy.zeros(len(self.begin), bool)
+        self.valid = numpy.zeros(len(self.begin), bool)
         self.samples = numpy.full((*self.times.shape, 12), numpy.nan)
         pending, low_order = numpy.flatnonzero(self.usual), first_low_order(arithmetic)
         while len(pending) and low_order < arithmetic.in_lanes.order:
             pending = self._advance(pending, arithmetic, low_order, step_limit)
             low_order += _RISE
-        return self._states(), self.good
+        return self._states(), self.valid
 
     def _advance(self, pending: Any, arithmetic: DoubleDouble, low_order: int, step_limit: int) -> Any:
-        """Take all these motions, those of like rates side by side; gives those that need a larger n0."""
+        """Compute these motions, those of like rates side by side; returns those that need a larger n0."""
         position = numpy.empty(len(self.order), int)
         position[self.order] = numpy.arange(len(self.order))
         ordered = pending[numpy.argsort(position[pending])]
@@ -332,15 +330,14 @@ class _Grid:
             for sample, targets in enumerate(self.times[eights].T):
                 self.samples[eights, sample] = eight.reach_all(targets).T
             larger += eights[(eight.flags & (LARGER_N0 | NON_FINITE | TOO_SMALL)) == LARGER_N0].tolist()
-            self.good[eights] = (eight.flags == 0) & (eight.clock[LEFT] > 0)
+            self.valid[eights] = (eight.flags == 0) & (eight.clock[LEFT] > 0)
         return numpy.unique(numpy.array(larger, int))
 
     def _states(self) -> Pairs:
-        """The samples in the units of the problems; NaN where they are not good."""
+        """The samples in the units of the problems; NaN where they are not valid."""
         high, low = (numpy.ldexp(self.samples[:, :, k : k + 6], self.exponents[:, None, :]) for k in (0, 6))
         total = high + low
-        bad = ~self.good
-        total[bad] = numpy.nan
+        total[~self.valid] = numpy.nan
         return Pairs(total, low - (total - high))
 
 

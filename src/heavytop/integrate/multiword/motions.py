@@ -1,4 +1,4 @@
-"""Motions computed in multi-word arithmetic: the same call as heyoka's, on the project's own Taylor integrator."""
+"""Motions computed in multi-word arithmetic, by the project's own Taylor integrator; called as heyoka's."""
 
 from __future__ import annotations
 
@@ -38,16 +38,16 @@ CHUNK_SECONDS = 0.25
 _FIRST_CHUNK = 16
 _LARGE_EXPONENT = 500
 _MANY = 64
-"""States at so many times are sampled in few calls."""
+"""From so many times on, states are sampled in few calls."""
 _LARGE = 2.0**_LARGE_EXPONENT
 _EVERY_BIT = 1200
 """Bits in which sums of doubles below 2^100 are exact."""
 _SLACK = 8
-"""Bits that words are wider than those of their grid, and sums of them than they, at most."""
+"""Words are at most so many bits wider than those of their grid, and their sums than they."""
 _TOO_MANY, _FEW = 1000, 10**6
-"""Times the steps that a motion asks for, and so many more: in quad 10**9 take twenty minutes."""
+"""A run may take so many times the steps of the motion, and so many more: in quad 10**9 take twenty minutes."""
 _LEAST_LOW = 2.0**-960
-"""A low word that is larger has all its bits."""
+"""A larger low word has all its bits."""
 OUTCOMES = {
     Status.OK: Outcome.SUCCESS,
     Status.NON_FINITE: Outcome.NON_FINITE,
@@ -73,14 +73,14 @@ def propagate_multiword(
     """The motion from ``start`` at t = 0, at ``times``, computed in multi-word arithmetic and rounded to ``precision``
     once.
 
-    tolerance: the local error aimed at, relative to the state; None for what the format can show.
+    tolerance: the local error aimed at, relative to the state; None for that of the format.
     The other arguments and what is raised: as in :func:`heavytop.integrate.heyoka.motions.propagate`.
 
     Raises InputError for a tolerance that is not positive and below 1.  A failed run is an outcome, not an exception.
     """
     problem = Problem.of(top, start, require(precision), system, xi)
     instants = check_times(times)
-    # doubles serve here as they are: to make reals of them takes as long as hundreds of steps
+    # doubles are used as they are: converting them to reals takes as long as hundreds of steps
     wide = precision.bits >= DOUBLE.bits
     targets = instants.numbers if wide and isinstance(instants, DoubleTimes) else numbers(instants, precision)
     return integrate_to_samples(problem, targets, tolerance, step_limit, observer, place=place, mark=mark)
@@ -99,33 +99,33 @@ def integrate_to_samples(
 ) -> Trajectory:
     """The motion of ``problem`` at ``targets``, native numbers in order.
 
-    between: called between chunks of a quarter of a second; it may raise to give the run up.
+    between: called between chunks of a quarter of a second; it may raise to abort the run.
     """
     arithmetic, scaled = choose(problem, tolerance)
     compiling = compiled(arithmetic, problem.system, problem.xi is not None)
     flags = arithmetic.flags
     forwards = bool(targets[-1] >= 0)
     began = perf_counter()
-    pace = _Pace(arithmetic.begin(scaled, forwards), scaled, problem.precision, step_limit, between)
-    if step_limit is None and isinstance(pace.run, Fixed):
+    run = _ScaledRun(arithmetic.begin(scaled, forwards), scaled, problem.precision, step_limit, between)
+    if step_limit is None and isinstance(run.run, Fixed):
         _require_reach(problem, scaled, exact(targets[-1]))
     times: Sequence[Fraction]
     states: Any
     if all(option is None for option in (step_limit, observer, between, place, mark)) and _are_many(
-        pace, targets, problem
+        run, targets, problem
     ):
-        outcome, states = pace.sampled(targets, problem.precision)
+        outcome, states = run.sampled(targets, problem.precision)
         times, seconds = RoundedTimes(targets[: len(states)]), perf_counter() - began
     else:
-        times, states, outcome, seconds = sampled(pace, targets, flags, began, observer, place, mark)
+        times, states, outcome, seconds = sampled(run, targets, flags, began, observer, place, mark)
     ended = times, states, outcome, seconds
-    return trajectory_of(problem, "multiword", pace, pace.run.order, compiling, flags, *ended)
+    return trajectory_of(problem, "multiword", run, run.run.order, compiling, flags, *ended)
 
 
 def _require_reach(problem: Problem, scaled: Scaled, end: Fraction) -> None:
-    """Raises OutOfReach for a run on a grid of many more steps than the motion asks for, and than anyone waits for.
+    """Raises OutOfReach for a run on a grid of far more steps than the motion needs.
 
-    A grid bounds |Ω| by the energy over the least moment: of a thin rod by a rate at which it does not move.
+    A grid bounds |Ω| by the energy over the least moment; a thin rod never turns so fast.
     """
     fewest = abs(end) * scaled.rate / LONGEST_STEP
     if not scaled.rest and fewest > _TOO_MANY * (expected_steps(problem, end) + _FEW):
@@ -137,15 +137,15 @@ def _require_reach(problem: Problem, scaled: Scaled, end: Fraction) -> None:
         )
 
 
-def _are_many(pace: _Pace, targets: Sequence[Any], problem: Problem) -> bool:
-    """Whether the states at many times are asked for that whole arrays hold, far from the ends of their exponents."""
-    if len(targets) < _MANY or pace.scaled.rest or not _holds(pace.run, problem.precision):
+def _are_many(run: _ScaledRun, targets: Sequence[Any], problem: Problem) -> bool:
+    """Whether there are many times, and arrays hold the states, far from the ends of their exponent range."""
+    if len(targets) < _MANY or run.scaled.rest or not _holds(run.run, problem.precision):
         return False
     far = all(
-        1 / _LARGE < abs(float(time) * float(pace.scaled.rate)) < _LARGE
+        1 / _LARGE < abs(float(time) * float(run.scaled.rate)) < _LARGE
         for time in (targets[int(targets[0] == 0)], targets[-1])
     )
-    return far and max(map(abs, pace.scaled.exponents)) <= _LARGE_EXPONENT
+    return far and max(map(abs, run.scaled.exponents)) <= _LARGE_EXPONENT
 
 
 def _holds(run: ResumableRun, precision: Precision) -> bool:
@@ -158,7 +158,7 @@ def _holds(run: ResumableRun, precision: Precision) -> bool:
 def native_state(state: tuple[Fraction, ...], precision: Precision) -> Any:
     """A state rounded to numbers of a format, an array of shape (6,) or (9,); None where one is too large for it.
 
-    What is too small for the format becomes 0, as in the format's own arithmetic.
+    A number too small for the format becomes 0, as in its own arithmetic.
     """
     values = []
     for value in state:
@@ -172,9 +172,10 @@ def native_state(state: tuple[Fraction, ...], precision: Precision) -> Any:
 
 
 def sums_of_two(words: Iterable[tuple[float, float, int]], precision: Precision) -> list[Any] | None:
-    """(high + low) 2^exponent of each, rounded once as :func:`heavytop.precision.number` rounds, without exact numbers.
+    """(high + low) 2^exponent of each, rounded once as by :func:`heavytop.precision.number`, without exact numbers.
 
-    None where only those tell: near the ends of the exponents of doubles, in quad, and in fewer bits than double has.
+    None where exact numbers are needed: near the ends of the exponents of doubles, in quad, and in fewer bits than
+    double has.
     """
     if precision.bits < DOUBLE.bits or precision.family == "quad":
         return None
@@ -189,32 +190,32 @@ def sums_of_two(words: Iterable[tuple[float, float, int]], precision: Precision)
 
 
 def _sums_of_columns(pair: Sequence[Doubles], sizes: Doubles, precision: Precision) -> tuple[Array, Any]:
-    """:func:`sums_of_two` of whole columns, a size of each; and the rows in which only exact numbers tell."""
+    """:func:`sums_of_two` of columns times a size each; and the rows that need exact numbers."""
     highs, lows = pair
     total = highs + lows
-    odd = _outside(total, 1 / _LARGE, _LARGE)
+    inexact = _outside(total, 1 / _LARGE, _LARGE)
     if precision.family == "double":
         total += 0.0  # a zero has no sign
-        return total if (sizes == 1).all() else total * sizes, odd
+        return total if (sizes == 1).all() else total * sizes, inexact
     lows = lows * sizes
-    odd |= _outside(lows, _LEAST_LOW, math.inf)
+    inexact |= _outside(lows, _LEAST_LOW, math.inf)
     if precision.family == "extended":
         sums = (highs * sizes + 0.0).astype("longdouble")
         sums += lows
-        return sums, odd
-    return _added(_widening(precision)(0.0), [highs * sizes, lows]), odd
+        return sums, inexact
+    return _added(_widening(precision)(0.0), [highs * sizes, lows]), inexact
 
 
-def _outside(values: Doubles, least: float, most: float) -> Any:
+def _outside(values: Doubles, smallest: float, largest: float) -> Any:
     """The rows in which some number is neither 0 nor of a size between the two."""
     sizes = abs(values)
-    if sizes.min(initial=most) > least and sizes.max(initial=0) < most:
+    if sizes.min(initial=largest) > smallest and sizes.max(initial=0) < largest:
         return numpy.zeros(len(sizes), bool)
-    return (((sizes <= least) & (sizes > 0)) | ~(sizes < most)).any(axis=1)
+    return (((sizes <= smallest) & (sizes > 0)) | ~(sizes < largest)).any(axis=1)
 
 
 def _added(start: Array, arrays: Sequence[Doubles]) -> Array:
-    """start + the first + the second …, in the numbers of ``start``: one array of them is made, not one a sum."""
+    """start + the first + the second …, in the number type of ``start``, accumulated in one array."""
     total = start + arrays[0]
     for array in arrays[1:]:
         total += array
@@ -224,22 +225,22 @@ def _added(start: Array, arrays: Sequence[Doubles]) -> Array:
 def _reals(words: list[Doubles], grid: Grid, sizes: Doubles, bits: int) -> Array:
     """The sums of words times the sizes, powers of two, rounded once.
 
-    Those on the grid that fit into ``bits`` bits add up exactly; where the others do too, only their sum is rounded.
+    The words that fit into ``bits`` bits add up exactly; where the others do too, only the last sum is rounded.
     """
     heyoka = import_heyoka()
     zero, first = heyoka.real(0, bits), min(grid.words - 1, (bits - _SLACK) // grid.bits)
-    # a double has 53 bits: of a larger one none is lost behind what the others begin with
-    least = 2.0 ** max(-1000, DOUBLE.bits + _SLACK - grid.bits * first - bits)
+    # a larger double has all its 53 bits within those of the sum
+    smallest = 2.0 ** max(-1000, DOUBLE.bits + _SLACK - grid.bits * first - bits)
     scale = numpy.array([heyoka.real(float(size)) for size in sizes])
-    if first > 0 and all(((abs(word) >= least) | (word == 0)).all() for word in words[first:]):
-        if early := least * sizes.min() > _LEAST_LOW:
+    if first > 0 and all(((abs(word) >= smallest) | (word == 0)).all() for word in words[first:]):
+        if scaled_first := smallest * sizes.min() > _LEAST_LOW:
             words = [word * sizes for word in words]
         sums = _added(zero, words[:first])
         for column in range(len(sizes)):
-            rest = [word[:, column] for word in words[first:] if word[:, column].any()]
-            if rest:
-                sums[:, column] += rest[0] if len(rest) == 1 else _added(zero, rest)
-        if early:
+            lower = [word[:, column] for word in words[first:] if word[:, column].any()]
+            if lower:
+                sums[:, column] += lower[0] if len(lower) == 1 else _added(zero, lower)
+        if scaled_first:
             return sums
     else:
         total = _added(heyoka.real(0, _EVERY_BIT), words)
@@ -250,25 +251,25 @@ def _reals(words: list[Doubles], grid: Grid, sizes: Doubles, bits: int) -> Array
 
 
 def _sums_of_words(words: Doubles, grid: Grid, sizes: Doubles, precision: Precision) -> tuple[Array, Any]:
-    """The sums of words of a grid, shape (n, K + 1, components), times a size each, rounded once; and the rows in which
-    only exact numbers tell.
+    """The sums of words of a grid, shape (n, K + 1, components), times a size each, rounded once; and the rows that
+    need exact numbers.
     """
     heyoka = import_heyoka()
     columns = [words[:, k] for k in range(words.shape[1])]
     if precision.family == "real":
         return _reals(columns, grid, sizes, precision.bits), numpy.zeros(len(words), bool)
-    # two words fill a quad, and what the others add to is added to them at once
+    # two words fill a quad: the sum of the others is added to them at once
     first, second, third, *smaller = (word * sizes for word in columns)
-    rest, odd = third.astype(heyoka.real128), numpy.zeros(len(words), bool)
+    lower, inexact = third.astype(heyoka.real128), numpy.zeros(len(words), bool)
     for word in smaller:
         for column in numpy.flatnonzero(word.any(axis=0)):
-            own, added = rest[:, column], word[:, column].astype(heyoka.real128)
-            total = own + added
-            odd |= (total - own != added) | (total - added != own)
-            rest[:, column] = total
+            before, added = lower[:, column], word[:, column].astype(heyoka.real128)
+            total = before + added
+            inexact |= (total - before != added) | (total - added != before)
+            lower[:, column] = total
     result = first.astype(heyoka.real128) + second
-    result += rest
-    return result, odd
+    result += lower
+    return result, inexact
 
 
 def _exact_sums(words: Iterable[Doubles]) -> tuple[Fraction, ...]:
@@ -280,7 +281,7 @@ def _exact_sums(words: Iterable[Doubles]) -> tuple[Fraction, ...]:
 
 
 def _widening(precision: Precision) -> Callable[[float], Any]:
-    """A double as a number of a format with as many bits or more."""
+    """The conversion of a double to a format with as many bits or more."""
     if precision.family in ("double-double", "real"):
         heyoka = import_heyoka()
 
@@ -289,7 +290,7 @@ def _widening(precision: Precision) -> Callable[[float], Any]:
 
 
 @dataclass(slots=True)
-class _Pace(SampledRun):
+class _ScaledRun(SampledRun):
     """A run advanced in chunks, in the units of the problem."""
 
     run: ResumableRun
@@ -301,12 +302,12 @@ class _Pace(SampledRun):
 
     @property
     def steps(self) -> int:
-        """Steps that stand."""
+        """The steps taken so far."""
         return self.run.steps
 
     @property
     def time(self) -> Fraction:
-        """Where the last step ended."""
+        """The exact time at the end of the last step."""
         return self.run.time / self.scaled.rate * (1 if self.run.forwards else -1)
 
     def covers(self, target: Fraction) -> bool:
@@ -319,21 +320,21 @@ class _Pace(SampledRun):
         began, before = perf_counter(), self.run.steps
         status = self.run.advance(abs(target) * self.scaled.rate, chunk)
         if status is Status.OK:
-            a_step = (perf_counter() - began) / max(1, self.run.steps - before)
-            self._chunk = max(1, min(4 * self._chunk, int(CHUNK_SECONDS / a_step)))
+            seconds_per_step = (perf_counter() - began) / max(1, self.run.steps - before)
+            self._chunk = max(1, min(4 * self._chunk, int(CHUNK_SECONDS / seconds_per_step)))
         return OUTCOMES[status]
 
     def sampled(self, targets: Any, precision: Precision) -> tuple[Outcome, Array]:
-        """The outcome, and the states at those of many times that are reached, as from :meth:`reach` and
-        :meth:`sample`, in few calls.
-        """
+        """The outcome and the states at the times reached, of many: those of :meth:`at`, in few calls."""
         if targets[0] == 0:
             outcome, states = self.sampled(targets[1:], precision)
             start = native_state(self.scaled.back(self.scaled.state), precision)
             return outcome, numpy.concatenate([[start], states])
         sampler = self._of_a_grid if isinstance(self.run, Fixed) else self._of_two_words
-        status, states, others = sampler(targets, numpy.array([float(size) for size in self.scaled.sizes]), precision)
-        for row, state in sorted(others.items()):
+        status, states, exact_states = sampler(
+            targets, numpy.array([float(size) for size in self.scaled.sizes]), precision
+        )
+        for row, state in sorted(exact_states.items()):
             rounded = None if state is None else native_state(self.scaled.back(state), precision)
             if rounded is None:
                 return Outcome.CAPACITY if state is None else Outcome.NON_FINITE, states[:row]
@@ -341,22 +342,22 @@ class _Pace(SampledRun):
         return OUTCOMES[status], states
 
     def _of_two_words(self, targets: Any, sizes: Doubles, precision: Precision) -> Any:
-        """How it ended, the states at the times that are reached, and by their rows those that only exact numbers
-        tell.
-        """
+        """The status, the states at the times reached, and by its row each state that needs exact numbers."""
         assert isinstance(self.run, Floating)
         times, rate = numpy.asarray(targets), float(self.scaled.rate) * (1 if self.run.forwards else -1)
         highs = times.astype(float)
         lows = numpy.zeros(len(times)) if (times == highs).all() else (times - highs).astype(float)
-        places = [[index + word for index in PLACES[: len(sizes)]] for word in (0, 8)]
-        parts, count, others = list[Array](), 0, dict[int, tuple[Fraction, ...]]()
+        columns = [[index + word for index in PLACES[: len(sizes)]] for word in (0, 8)]
+        parts, count, exact_states = list[Array](), 0, dict[int, tuple[Fraction, ...]]()
         for words in self.run.sampled(highs * rate, lows * rate):
-            pair = [words.take(indices, 1) for indices in places]
-            states, odd = _sums_of_columns(pair, sizes, precision)
-            others |= {count + int(row): _exact_sums(word[row] for word in pair) for row in numpy.flatnonzero(odd)}
+            pair = [words.take(indices, 1) for indices in columns]
+            states, inexact = _sums_of_columns(pair, sizes, precision)
+            exact_states |= {
+                count + int(row): _exact_sums(word[row] for word in pair) for row in numpy.flatnonzero(inexact)
+            }
             parts.append(states)
             count += len(words)
-        return self.run.status, numpy.concatenate(parts), others
+        return self.run.status, numpy.concatenate(parts), exact_states
 
     def _of_a_grid(self, targets: Any, sizes: Doubles, precision: Precision) -> Any:
         """As :meth:`_of_two_words`, of a run on a grid."""
@@ -364,15 +365,15 @@ class _Pace(SampledRun):
         instants, rate, grid = numpy.asarray(targets), self.scaled.rate, self.run.grid
         times: Doubles = instants.astype(float)
         if (instants == times).all():  # the rate is a power of two
-            status, words, others = self.run.sampled(abs(times) * float(rate))
+            status, words, overflows = self.run.sampled(abs(times) * float(rate))
         else:
-            status, words, others = self.run.sampled([abs(exact(target)) * rate for target in targets])
+            status, words, overflows = self.run.sampled([abs(exact(target)) * rate for target in targets])
 
-        states, odd = _sums_of_words(words, grid, sizes, precision)
-        return status, states, {int(row): _exact_sums(words[row]) for row in numpy.flatnonzero(odd)} | others
+        states, inexact = _sums_of_words(words, grid, sizes, precision)
+        return status, states, {int(row): _exact_sums(words[row]) for row in numpy.flatnonzero(inexact)} | overflows
 
     def at(self, target: Any, time: Fraction) -> tuple[Outcome, Any]:
-        """The outcome of :meth:`reach`, and the state at ``time``, rounded; None where it cannot be given."""
+        """The outcome of :meth:`reach`, and the state at ``time``, rounded; None where it has no number."""
         outcome, precision = self.reach(time), self.precision
         if outcome is not Outcome.SUCCESS:
             return outcome, None
@@ -397,12 +398,12 @@ class _Pace(SampledRun):
         return None if state is None else self.scaled.back(state)
 
     def place(self, samples: int, seconds: float, flags: dict[str, str]) -> ResumePoint:
-        """Where the last step began; at rest, the beginning."""
+        """The resume point at the beginning of the last step; of an equilibrium, the start."""
         words, steps = ((), 0) if self.scaled.rest else (self.run.resume_words(), self.run.steps - 1)
         return ResumePoint(samples, (), (), steps, seconds, flags, words)
 
     def take_up(self, resume_point: ResumePoint, covered: Any) -> None:
-        """Go on from there; takes the step again that covers the last sample."""
+        """Resume there: repeat the step that covers the last sample."""
         if resume_point.words:
             self.run.restore(resume_point.words, resume_point.steps)
             self.reach(exact(covered))
