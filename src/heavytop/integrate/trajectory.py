@@ -232,9 +232,9 @@ class Problem:
         p = self.parameters
         return HeavyTop(p.inertia, 1, p.moment, p.rotor if self.system is HEAVY_GYROSTAT else None)
 
-    @staticmethod
-    @cache_last_call
+    @classmethod
     def of(
+        cls,
         top: HeavyTop,
         start: State,
         precision: Precision,
@@ -242,20 +242,28 @@ class Problem:
         xi: tuple[Fraction, ...] | None = None,
     ) -> Problem:
         """The problem rounded to ``precision``; the rotor is computed from the exact data first."""
-
-        def nearest(values: Any) -> tuple[Fraction, ...]:
-            return tuple(rounded(value, precision) for value in values)
-
-        # of the gyrostat the start is part of them
-        parameters = _rounded_parameters(top, start if system is GYROSTAT else None, precision, system)
-        rounded_start = State(nearest(start.omega), nearest(start.gamma))
-        return Problem(system, precision, parameters, rounded_start, None if xi is None else nearest(xi), (top, start))
+        return _rounded(
+            top, start, precision, system, xi
+        )  # all arguments: a call with fewer is another call to the cache
 
     def native(self, values: Any) -> list[Any]:
         """Numbers that are rounded to the format, as numbers of it."""
         if self.precision.family == "double":
             return [float(value) for value in values]
         return [number(exact(value), self.precision) for value in values]
+
+
+@cache_last_call
+def _rounded(
+    top: HeavyTop, start: State, precision: Precision, system: System, xi: tuple[Fraction, ...] | None
+) -> Problem:
+    def nearest(values: Any) -> tuple[Fraction, ...]:
+        return tuple(rounded(value, precision) for value in values)
+
+    # of the gyrostat the start is part of them
+    parameters = _rounded_parameters(top, start if system is GYROSTAT else None, precision, system)
+    rounded_start = State(nearest(start.omega), nearest(start.gamma))
+    return Problem(system, precision, parameters, rounded_start, None if xi is None else nearest(xi), (top, start))
 
 
 @cache_last_call
