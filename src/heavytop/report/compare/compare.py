@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
@@ -82,19 +80,6 @@ class Differences:
         } | ({"surveys": [survey.to_json() for survey in self.motions]} if self.motions else {})
 
 
-@contextmanager
-def _uncollected() -> Iterator[None]:
-    """Without garbage collection: rows make no cycles, and looking for these in so many takes a tenth of the time."""
-    collects = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if collects:
-            gc.enable()
-
-
-@_uncollected()
 def compare(
     baseline: AnyReport,
     candidate: AnyReport,
