@@ -18,7 +18,7 @@ from heavytop.exact.bodies import Finder
 from heavytop.exact.catalogue import find
 from heavytop.exact.enclosure.run import EFFORT
 from heavytop.integrate import registry
-from heavytop.integrate.dense import Dense, DenseOutput, dense
+from heavytop.integrate.dense import Dense, dense, dense_output
 from heavytop.integrate.frames import Setup
 from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.motions import states_at
@@ -128,14 +128,14 @@ def propagate(
             angles=True,
             **options,
         )
-        whole_states = shown.trajectory.states
+        states = shown.trajectory.states
         return replace(
             shown.trajectory,
-            states=whole_states[:, :6],
-            attitude=whole_states[:, 6:],
+            states=states[:, :6],
+            attitude=states[:, 6:],
             angle_texts=shown.angles,
         )
-    # what of the arguments can change between two calls is looked at in each
+    # mutable arguments are checked in each call
     checked = _checked_names(options)
     checked["step_limit"] = arguments.steps(checked["step_limit"])
     lasting = isinstance(integrator, str) and checked["tolerance"] is None and xi is None and observer is None
@@ -160,20 +160,20 @@ def _prepared(
     body, state = arguments.motion(top, start, form)
     setup = Setup.of(body, state, form, arguments.system(system, body))
     options = _options(form, dict(zip(_OPTIONS, values, strict=True)), setup.watched(observer))
-    wanted = arguments.flag(attitude, "attitude")
+    with_attitude = arguments.flag(attitude, "attitude")
     which = named(integrator)
-    if wanted is None:
-        wanted = state.attitude is not None and described(which).carries_attitude
-    beside = xi is None and wanted
+    if with_attitude is None:
+        with_attitude = state.attitude is not None and described(which).carries_attitude
+    apart = xi is None and with_attitude
     if xi is not None:
         options["xi"] = setup.own(arguments.attitude(xi, state, form))
-    elif beside:
+    elif apart:
         options["xi"] = setup.xi
     run = registry.propagator(which, options)
 
     def call(times: Numbers) -> Trajectory:
         trajectory: Trajectory = run(setup.top, setup.start, check_times(times), form, system=setup.system)
-        if beside:
+        if apart:
             trajectory = replace(trajectory, states=trajectory.states[:, :6], attitude=trajectory.states[:, 6:])
         return setup.given(trajectory).with_dense(_dense(setup, which, trajectory.time_reached, options))
 
@@ -193,7 +193,7 @@ def _dense(
         problem = Problem.of(setup.top, setup.start, setup.precision, setup.system, options.get("xi"))
         return dense(which, problem, until, *limits)
 
-    output = DenseOutput(run)
+    output = dense_output(run)
     return lambda time: setup.in_body_axes(output(time))
 
 
@@ -479,13 +479,11 @@ class Integrator:
             OutOfReach: as :func:`propagate`.
         """
         targets, is_one = self._targets(times)
-        if isinstance(start, State):
-            return self._together([self._one(start, None, targets)], targets, False, is_one)
-        rows, several = self._rows(start)
+        starts, several = ([start], False) if isinstance(start, State) else self._rows(start)
         trajectories = []
-        for index, row in enumerate(rows):
+        for index, member in enumerate(starts):
             try:
-                trajectories.append(self._one(None, row, targets))
+                trajectories.append(self._one(member, targets))
             except InputError as error:
                 if not several:
                     raise
@@ -516,21 +514,19 @@ class Integrator:
             raise InputError(f"start must be a State or an array of numbers; got {quoted(start)}.", _SHAPES) from None
         raise InputError(f"start has the shape {array.shape}.", _SHAPES)
 
-    def _one(self, state: State | None, row: Any, targets: Sequence[OrderedRing]) -> tuple[Any, Outcome, Any, int]:
+    def _one(self, start: Any, targets: Sequence[OrderedRing]) -> tuple[Any, Outcome, Any, int]:
         """As :func:`heavytop.integrate.heyoka.motions.states_at`."""
         if self._is_plain:
-            plain = self._plain(state, row, targets)
+            plain = self._plain(start, targets)
             if plain is not None:
                 engine = self._tool.take()
                 try:
                     return states_at(engine, self._numbers, plain, targets, self._limit, self._form)
                 finally:
                     self._tool.spare.append(engine)
-        if state is None:
-            state = State(row[:3], row[3:])
         trajectory = propagate(
             self._top,
-            state,
+            start if isinstance(start, State) else State(start[:3], start[3:]),
             [exact(target) for target in targets],
             self._form,
             integrator=self._asked,
@@ -540,15 +536,15 @@ class Integrator:
         )
         return trajectory.states, trajectory.outcome, number(trajectory.time_reached, self._form), trajectory.steps
 
-    def _plain(self, state: State | None, row: Any, targets: Sequence[OrderedRing]) -> Any:
-        """The start in doubles, checked; None for irrational ones, and where exact numbers tell what is wrong."""
-        if state is not None:
-            if state.attitude is not None:
+    def _plain(self, start: Any, targets: Sequence[OrderedRing]) -> Any:
+        """The start in doubles, checked; None for an irrational or an invalid one, which exact numbers treat."""
+        if isinstance(start, State):
+            if start.attitude is not None:
                 return None
-            arguments.motion(self._top, state, self._form)
-            values = list(map(float, self._problem(state).start.flat))
-        elif row.dtype == numpy.float64:
-            values = row.tolist()
+            arguments.motion(self._top, start, self._form)
+            values = list(map(float, self._problem(start).start.flat))
+        elif start.dtype == numpy.float64:
+            values = start.tolist()
         else:
             return None
         w1, w2, w3, g1, g2, g3 = values

@@ -1,7 +1,7 @@
 """The Taylor polynomial of every step of an integrator, as polynomials over the rational numbers.
 
-Coefficients are rounded to fixed-point numbers 2^-64 below the format's eps of the largest in their component: far
-below what the integrator itself errs, and short enough that a step costs some 0.1 ms.
+Coefficients are rounded to fixed-point numbers, to 2^-64 eps of the largest in their component: far below the error
+of the integrator, and short enough that a step costs some 0.1 ms.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property, partial
+from functools import cache, partial
 from time import perf_counter
 from typing import Any
 
@@ -34,7 +34,7 @@ from heavytop.precision import DOUBLE, decimal_text, exact, number
 
 _SPARE_BITS = 64
 MOST_STEPS = 10**8
-"""Each is looked at, in some 0.1 ms in double: these take hours."""
+"""Each takes some 0.1 ms in double: these take hours."""
 
 Dyadic = tuple[int, int]
 """m and e of the number m 2^e."""
@@ -62,7 +62,7 @@ class Piece:
     """A step: the motion at ``began`` + s ``length`` for 0 ≤ s ≤ 1 (and ``end`` of the last one) as polynomials in s.
 
     began, length: exact; a step back in time has a negative length.
-    coefficients: gives the numbers c_n of one component, which is Σ c_n (s length)^n, or Σ c_n s^n without ``powers``.
+    coefficients: returns the c_n of one component, which is Σ c_n (s length)^n, or Σ c_n s^n without ``powers``.
     doubles: the c_n of all components, shape (6, order + 1), where they are doubles; else None.
     """
 
@@ -94,7 +94,7 @@ class Piece:
         return self._found[index]
 
     def boxes(self) -> tuple[list[float], list[float]] | None:
-        """(middles, half widths) of intervals that hold the components over the step, but for roundings; or None."""
+        """(midpoints, radii) of intervals that contain the components over the step, up to rounding; or None."""
         if self.doubles is None:
             return None
         sizes = abs(float(self.length)) ** numpy.arange(self.doubles.shape[1])
@@ -102,7 +102,7 @@ class Piece:
         return self.doubles[:, 0].tolist(), (abs(self.doubles) @ sizes).tolist()
 
     def _powers_of_length(self, count: int) -> list[Dyadic]:
-        """length^n for 0 ≤ n < count, to as many bits as are kept."""
+        """length^n for 0 ≤ n < count, cut to the bits of the coefficients."""
         m, e = dyadic(self.length)
         powers = [(1, 0)]
         for _ in range(count - 1):
@@ -112,7 +112,7 @@ class Piece:
         return powers
 
     def state(self, s: fmpq) -> list[Fraction]:
-        """(Ω, γ) at s, exactly as the polynomials give it."""
+        """(Ω, γ) at s, the exact values of the polynomials."""
         values = (self.component(index)(s) for index in range(6))
         return [Fraction(int(value.p), int(value.q)) for value in values]
 
@@ -137,9 +137,9 @@ def _fixed_point(values: Sequence[Dyadic], bits: int) -> fmpq_poly:
 
 @dataclass(slots=True)
 class Dense:
-    """A run from t = 0 whose steps are looked at one by one.
+    """A run from t = 0, step by step.
 
-    steps_of: gives the steps of such a run, on and on, and sets what it says of it.
+    steps_of: yields the steps of the run without end, and sets its outcome, counts, flags and seconds.
     until: exact, a number of the format.  outcome, steps, reached, order, seconds, flags: as of a
     :class:`heavytop.integrate.trajectory.Trajectory`, once :meth:`pieces` is at its end.
     """
@@ -232,7 +232,7 @@ def _reader(run: ResumableRun, scaled: Scaled, rate: Fraction) -> Callable[[int]
 
 
 _DENSE = {"heyoka": _of_heyoka, "multiword": _of_multiword}
-"""By name: those that hand over the polynomial of a step."""
+"""The integrators that expose the polynomial of a step, by name."""
 
 
 def dense(
@@ -256,23 +256,19 @@ def dense(
     return Dense(steps_of, problem, end, tolerance, step_limit)
 
 
-class DenseOutput:
-    """A finished run as a function of the time; its steps are taken again, and kept, when it is first asked.
+def dense_output(make: Callable[[], Dense]) -> Callable[[Fraction], list[Any]]:
+    """(Ω, γ) of a finished run, numbers of the format, as a function of the time; InputError outside of the run.
 
-    make: the run up to its last time.
+    make: the run up to its last time, whose steps are repeated at the first call and kept.
     """
 
-    def __init__(self, make: Callable[[], Dense]) -> None:
-        self._make = make
-
-    @cached_property
-    def _taken(self) -> tuple[Dense, list[Piece]]:
-        run = self._make()
+    @cache
+    def steps() -> tuple[Dense, list[Piece]]:
+        run = make()
         return run, [*run.pieces()]
 
-    def __call__(self, time: Fraction) -> list[Any]:
-        """(Ω, γ), numbers of the format; raises InputError for a time outside of the run."""
-        run, pieces = self._taken
+    def state(time: Fraction) -> list[Any]:
+        run, pieces = steps()
         sign, end = (1 if run.until > 0 else -1), run.reached
         if not 0 <= sign * time <= abs(end):
             raise InputError(f"t = {decimal_text(time, 6)} is not in the run.", f"Give 0 to {decimal_text(end, 6)}.")
@@ -282,3 +278,5 @@ class DenseOutput:
         piece = pieces[max(0, bisect_left(pieces, sign * time, key=lambda piece: sign * piece.began) - 1)]
         part = (time - piece.began) / piece.length
         return [number(value, problem.precision) for value in piece.state(fmpq(part.numerator, part.denominator))]
+
+    return state

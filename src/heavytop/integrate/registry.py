@@ -1,4 +1,4 @@
-"""Integrators: what each is to this program and can do, found by name or source, and called with the options asked for.
+"""Integrators: their records and capabilities, found by name or source, and called with the requested options.
 
 heyoka, multiword and the peers are records of the table :data:`INTEGRATORS`, where a new one is a line; what an entry
 point of another package names is one too.  A record that is in no table is its own source.
@@ -63,7 +63,7 @@ STEP_LIMIT = 10**7
 Peer = Callable[..., Trajectory]
 _YOURS = f"Yours is FILE.py:FUNCTION, FILE.toml, or an entry point {GROUP} (`heavytop docs gate`)."
 _PATIENCE = 60
-"""Seconds that a third-party package has to say what it is set by."""
+"""Seconds within which a third-party package must tell its control."""
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._:+-]{0,63}"
 _PYTHON = re.compile(r"(?s)(.+\.py):([A-Za-z_][\w.]*)")
 _TOML = re.compile(r"(?s)(.+\.toml)(?::(.*))?")
@@ -115,12 +115,12 @@ class Integrator:
 
     @property
     def is_known(self) -> bool:
-        """Whether it is found, by its source or by its name."""
+        """Whether its source or its name defines it."""
         return self.source is not None or bool(self.function) or self.name in known()
 
     @property
     def lacks(self) -> str:
-        """The first module of an extra that is not installed; "" where none lacks."""
+        """The first module of an extra that is not installed; "" where all are."""
         return next((module for module in self.needs if find_spec(module) is None), "")
 
     @property
@@ -290,7 +290,7 @@ def _given(problem: Problem) -> tuple[HeavyTop, State]:
 
 
 def foreign(name: str, function: str = "", source: IntegratorSource | None = None) -> Integrator:
-    """An integrator of another package, or of a source: nothing is known of what it can do."""
+    """An integrator of another package, or of a source, whose capabilities are unknown."""
     return Integrator(name, function, None, None, "", own=False, source=source)
 
 
@@ -300,7 +300,7 @@ def name_of(which: str | IntegratorSource) -> str:
 
 
 def described(which: str | IntegratorSource, set_to: tuple[str, Fraction] | None = None) -> Integrator:
-    """The record, without a look at the integrator: of another package's or a file's it says nothing."""
+    """The record, without importing the integrator: of another package's or a file's it knows no capability."""
     if isinstance(which, str):
         record = INTEGRATORS.get(which) or foreign(which)
     else:
@@ -602,7 +602,7 @@ def available() -> dict[str, str | None]:
     return reasons
 
 
-# Which runs are tried at all: those of no more steps than anyone waits for, whatever the units of the data.
+# Runs of so many steps that nobody waits for them are refused, whatever the units of the data.
 
 
 MOST_STEPS = 10**12
@@ -633,7 +633,7 @@ def _square_in_doubles(problem: Problem) -> float:
 
 
 def _is_near(problem: Problem, end: OrderedRing) -> bool:
-    """True only where the end is in reach by far; in doubles."""
+    """True only where far fewer steps than the limit reach the end; in doubles."""
     try:
         return float(end) ** 2 * _square_in_doubles(problem) < _FAR_BELOW**2
     except OverflowError:
@@ -659,10 +659,10 @@ def require_reach(
         )
 
 
-# Integrators by name or source, as callables that take the options asked for, and no others.
+# Integrators by name or source, as callables with the requested options.
 #
-# An option that an integrator does not have is refused where it is asked for, so none needs to take options that mean
-# nothing to it.  What each can do: :class:`Integrator`.
+# An option that an integrator does not have is an error, so none has to accept options without a meaning for it.
+# Capabilities: :class:`Integrator`.
 
 
 def propagator(which: str | IntegratorSource, options: dict[str, Any]) -> Callable[..., Any]:

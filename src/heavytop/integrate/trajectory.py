@@ -1,4 +1,4 @@
-"""The result of an integrator, whichever it was.  Knows no engine."""
+"""The result of any integrator: problem, trajectory, resume point."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from heavytop.top.stability import Stability
 
 
-# What a computed run tells of the attitude: in double at once for all samples, else from the exact native numbers.
+# The attitude of a computed run: in double for all samples at once, else from the exact native numbers.
 
 
 _GUARD_BITS = 64
@@ -110,7 +110,7 @@ def _start(run: Trajectory) -> list[float]:
 
 
 def _centre(run: Trajectory, output: Output) -> Vector:
-    """The centre of mass, which a rounded problem alone does not know: only its product with the weight."""
+    """The centre of mass; a rounded problem has only its product with the weight."""
     if run.frame is not None:
         return run.frame.centre
     if run.problem.given is not None:
@@ -141,7 +141,7 @@ def _columns(run: Trajectory, attitude: Any, output: Output) -> NDArray[numpy.fl
 
 
 def _exactly(run: Trajectory, index: int, attitude: Any, output: Output) -> Sequence[Any]:
-    """The output at one sample from the exact native numbers: exact, or of more bits than the format has."""
+    """The output at one sample from the exact native numbers: exact, or to more bits than the format has."""
     numbers = [*run.states[index][:6], *attitude[index]]
     try:
         state = [exact(value) for value in numbers]
@@ -161,16 +161,16 @@ def _functions(bits: int) -> SimpleNamespace:
     """Elementary functions of Fractions with so many bits right; a context of its own, which no thread shares."""
     from mpmath import MPContext
 
-    own = MPContext()
-    own.prec = bits
+    context = MPContext()
+    context.prec = bits
 
     def number(value: Fraction) -> Any:
-        return own.mpf(value.numerator) / value.denominator
+        return context.mpf(value.numerator) / value.denominator
 
     def atan2(y: Fraction, x: Fraction) -> Fraction:
-        return exact(own.atan2(number(y), number(x)))
+        return exact(context.atan2(number(y), number(x)))
 
-    return SimpleNamespace(sqrt=lambda value: exact(own.sqrt(number(value))), atan2=atan2)
+    return SimpleNamespace(sqrt=lambda value: exact(context.sqrt(number(value))), atan2=atan2)
 
 
 _FEW_DIGITS = 3.0
@@ -276,16 +276,16 @@ _ANY_START = State((0, 0, 0), (0, 0, 1))
 
 
 class OtherFlags(InputError):
-    """A place that was reached with other flags than the run that is to go on from it; names them."""
+    """A resume point of a run with other flags; names them."""
 
 
 @dataclass(frozen=True, slots=True)
 class ResumePoint:
-    """Where a run is: all that it needs to go on with the same bits, in native numbers.
+    """The state of a run from which it can be resumed with the same bits, in native numbers.
 
     samples: how many of the times are done.  state: before the step that covers the last of them; time: both words of
-    its time; steps: taken until then.  seconds: run so far.  flags: everything else that can change bits.
-    words: in place of state and time, all that an integrator in multi-word arithmetic knows there, as text.
+    its time; steps: taken before.  seconds: run so far.  flags: all else that can change bits.
+    words: in place of state and time, the state of an integrator in multi-word arithmetic, as text.
     """
 
     samples: int
@@ -297,7 +297,7 @@ class ResumePoint:
     words: tuple[str, ...] = ()
 
     def require_same(self, flags: dict[str, str]) -> None:
-        """Raises OtherFlags where the run that goes on has others."""
+        """Raises OtherFlags where the run to be resumed has others."""
         names = sorted(self.flags.keys() | flags.keys())
         different = [name for name in names if self.flags.get(name) != flags.get(name)]
         if different:
@@ -309,7 +309,7 @@ class ResumePoint:
             )
 
     def content(self, precision: Precision) -> dict[str, Any]:
-        """As plain text and integers, exact."""
+        """The fields as plain text and integers, exact."""
 
         def texts(values: tuple[Any, ...]) -> list[str]:
             # a zero keeps its sign
@@ -320,7 +320,7 @@ class ResumePoint:
 
     @classmethod
     def of(cls, content: dict[str, Any], precision: Precision) -> ResumePoint:
-        """The place with that :meth:`content`."""
+        """The resume point with that :meth:`content`."""
         state, time = (tuple(native(text, precision) for text in content[name]) for name in ("state", "time"))
         samples, steps, seconds, flags = (content[name] for name in ("samples", "steps", "seconds", "flags"))
         resume_point = cls(samples, state, time, steps, float(seconds), dict(flags), tuple(content.get("words", ())))
@@ -335,7 +335,7 @@ class ResumePoint:
 
 
 class InSpace:
-    """A motion whose attitude is seen in space: arrays in double, one entry a sample.
+    """A motion with its attitude in space, as arrays in double, one entry per sample.
 
     Each raises InputError for a motion without attitude.
     """
@@ -585,9 +585,9 @@ Ended = tuple[Sequence[Fraction], Any, "Outcome", float]
 
 
 class SampledRun(ABC):
-    """A run that is advanced to wherever its next sample lies.
+    """A run that is advanced from sample to sample.
 
-    between: called between chunks of steps; it may raise to give the run up.
+    between: called between chunks of steps; it may raise to abort the run.
     """
 
     step_limit: int | None
@@ -626,15 +626,15 @@ class SampledRun(ABC):
 
     @abstractmethod
     def at(self, target: Any, time: Fraction) -> tuple[Outcome, Any]:
-        """How it came to the time, given as the native number and exactly, and the native state there."""
+        """The outcome and the native state at a time, which is passed as native number and exactly."""
 
     @abstractmethod
     def take_up(self, resume_point: ResumePoint, covered: Any) -> None:
-        """Go on from there; takes the step again that covers the last sample."""
+        """Resume there: repeat the step that covers the last sample."""
 
     @abstractmethod
     def place(self, samples: int, seconds: float, flags: dict[str, str]) -> ResumePoint:
-        """Where the last step began."""
+        """The resume point at the beginning of the last step."""
 
 
 def sampled(
@@ -646,7 +646,7 @@ def sampled(
     resume_point: ResumePoint | None,
     mark: Callable[[ResumePoint], None] | None,
 ) -> Ended:
-    """The targets that were reached, the states there unless they went to the observer, the outcome and the seconds.
+    """The targets reached, the states there unless an observer took them, the outcome and the seconds.
 
     began: by :func:`time.perf_counter`.  The other arguments: as in
     :func:`heavytop.integrate.heyoka.motions.propagate`.
@@ -699,7 +699,7 @@ class TaylorStep:
     """One step of a Taylor method, in native numbers.
 
     start: state at its beginning, shape (6,).  length: h.  coefficients: of τ^k, shape (6, order + 1); the polynomial
-    may be asked beyond h.  end: state at its end, as the integrator goes on from it.
+    may be evaluated beyond h.  end: state at its end, from which the integrator continues.
     """
 
     start: Any
