@@ -1,4 +1,4 @@
-"""Many starts at once: SIMD lanes in double, threads in every format."""
+"""Ensembles: SIMD lanes in double, threads in every format."""
 
 from __future__ import annotations
 
@@ -36,17 +36,17 @@ def propagate_ensemble(
 
     problems: all of one system and format, with an attitude all or none; their tops may differ.
     times: exact numbers of one sign, strictly monotone away from 0 (0 itself may come first).
-    observer: called with (index of the problem, exact time, native state) in place of keeping the states; by the thread
-    that calls this, the times of each problem in order, the problems mixed.
-    finished: called with (index of the problem, its motion) as each ends, by the same thread, behind its samples.
+    observer: called with (index of the problem, exact time, native state) in place of storing the states, by the
+    calling thread; the times of each problem in order, the problems mixed.
+    finished: called with (index of the problem, its motion) as each ends, by the same thread, after its samples.
     threads: None for one per processor that this process may use.
     lanes: motions side by side in a batch engine, in double; other formats have none, and give the bits of
     :func:`heavytop.integrate.heyoka.motions.propagate`.
     step_limit: for each motion; the times reached until then are returned.
     options: tolerance, high_accuracy, compact_mode as in :func:`heavytop.integrate.heyoka.engines.compiled`.
 
-    Each motion has its own outcome; one that fails changes nothing in the others.  ``run`` of its seconds is the time
-    that it was under way, beside others.
+    Each motion has its own outcome; one that fails changes nothing in the others.  ``run`` of its seconds is its wall
+    time, shared with others.
 
     Raises InputError for no problems, for problems of several kinds, for times out of order, for a format that the
     platform lacks, and for fewer than 1 thread or 2 lanes.
@@ -80,7 +80,7 @@ def in_threads(
     observer: EnsembleObserver | None,
     finished: Finished | None,
 ) -> list[Trajectory]:
-    """The motions of ``work`` in the order of its problems, by threads that each do ``run``, or by this one.
+    """The motions of ``work`` in the order of its problems, by threads that each call ``run``, or by this one.
 
     threads, observer, finished: as in :func:`propagate_ensemble`; the last two are called by this thread.
     width: problems that a thread runs side by side.
@@ -102,7 +102,7 @@ def in_threads(
             observer(*item)
 
     def receive_here(item: Any) -> None:
-        with numpy.errstate(**error_state):  # the caller's, whatever the lanes have set
+        with numpy.errstate(**error_state):  # the caller's, not that of the lanes
             receive(item)
 
     if threads == 1:

@@ -1,4 +1,4 @@
-"""A run that was computed in principal axes, in the axes in which its body was given."""
+"""Runs computed in principal axes, rotated into the axes in which the body was given."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from heavytop.top.heavy_top import HeavyTop, State
 def framed(run: Trajectory, frame: Frame) -> Trajectory:
     """The run with its states, and ξ where it was computed, in the axes given; ``run`` is its ``principal``.
 
-    Each number is rounded once, to the format of the run; where the axes are the principal ones in another order or of
-    the other sign, none is.
+    Each number is rounded once, to the format of the run; none is where the axes are a permutation of the principal
+    ones, up to signs.
     """
     states = in_frame(run.states, frame, run.problem.precision)
     attitude = None if run.attitude is None else in_frame(run.attitude, frame, run.problem.precision)
@@ -41,17 +41,17 @@ def in_frame(values: NDArray[numpy.float64], frame: Frame, precision: Precision)
     for begin in range(0, rotated.shape[1], 3):
         part = values[:, begin : begin + 3]
         if all(map(all, is_integral)):
-            turned = _permuted(part, frame)
+            rotated[:, begin : begin + 3] = _permuted(part, frame)
         elif precision == DOUBLE:
-            turned = _in_double(part.astype(float), frame)
+            rotated[:, begin : begin + 3] = _in_double(part.astype(float), frame)
         else:
-            turned = numpy.array([_turned_exactly(line, frame, precision) for line in part], dtype=rotated.dtype)
-        rotated[:, begin : begin + 3] = turned
+            lines = [_rotated_exactly(line, frame, precision) for line in part]
+            rotated[:, begin : begin + 3] = numpy.array(lines, dtype=rotated.dtype)
     return rotated
 
 
 def _permuted(part: NDArray[numpy.float64], frame: Frame) -> Any:
-    """Each component of the axes given is one of the others, or its negative."""
+    """The components permuted, with signs."""
     columns = []
     for row in frame.axes:
         axis = next(i for i in range(3) if row[i])
@@ -59,7 +59,7 @@ def _permuted(part: NDArray[numpy.float64], frame: Frame) -> Any:
     return numpy.stack(columns, axis=1)
 
 
-def _turned_exactly(line: Sequence[Any], frame: Frame, precision: Precision) -> list[Any]:
+def _rotated_exactly(line: Sequence[Any], frame: Frame, precision: Precision) -> list[Any]:
     try:
         vector = [exact(value) for value in line]
     except InputError:  # the last state of a run that failed
@@ -68,26 +68,26 @@ def _turned_exactly(line: Sequence[Any], frame: Frame, precision: Precision) -> 
 
 
 def _in_double(part: NDArray[numpy.float64], frame: Frame) -> NDArray[numpy.float64]:
-    """A times each vector in two doubles: rounded once."""
+    """A times each vector in double-double, rounded once."""
     axes = Pairs.nearest(frame.axes)
     with numpy.errstate(invalid="ignore", over="ignore"):
         rows = (axes[i, 0] * part[:, 0] + axes[i, 1] * part[:, 1] + axes[i, 2] * part[:, 2] for i in range(3))
         return numpy.stack([row.high for row in rows], axis=1)
 
 
-# A motion as it is handed to an integrator, in principal axes, and what comes back in the axes given.
+# A motion in principal axes, as integrators take it, and its results in the axes given.
 
 
 _SPARE_BITS = 160
-"""Irrational data of a run are rounded to so many bits more than its format has, of what it is told itself."""
+"""Irrational data of a run are rounded to so many bits more than its format has."""
 
 
 @dataclass(frozen=True, slots=True)
 class Setup:
     """A motion in principal axes.
 
-    top, start: exact, of irrational data to many bits more than the format has.
-    carried: ξ at t = 0, where the data say it.
+    top, start: exact; irrational data to many bits more than the format has.
+    carried: ξ at t = 0, where the data determine it.
     frame: the axes given; None where they are the principal ones.
     """
 

@@ -1,7 +1,7 @@
 """The contract of a third-party integrator, and the one place that checks it.
 
-Whatever the code of others does, short of ending the process, comes out as a Trajectory that keeps the contract or as
-PeerFailed, which says in a sentence what it did.
+Whatever third-party code does, short of ending the process, becomes a Trajectory that keeps the contract or PeerFailed,
+whose text describes the failure.
 """
 
 from __future__ import annotations
@@ -40,16 +40,16 @@ DEFAULT_STEP = Fraction(1, 100)
 _OFF_SPHERE = Fraction(1, 10**6)
 """By which |γ|² may differ from 1 where a quaternion stands for it, and radians between directions that are one."""
 _FINER = 16
-"""Times as short as it was asked for a step may be made, so that all times are multiples of it."""
+"""A step may be shortened so many times at most, so that all times are multiples of it."""
 _ALONE = RLock()
-"""Where a process prints and what it warns of are its own, not a thread's: the code of others runs alone."""
+"""Standard output and warnings belong to the process, not to a thread: third-party code runs alone."""
 
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Drops what code of others prints and warns of, from C too, and leaves what is the process's as it was.
+    """Suppress output and warnings of third-party code, from C too, and restore the state of the process afterwards:
 
-    That is NumPy's error state, the working directory, and who hears of Ctrl-C and SIGTERM.
+    NumPy's error state, the working directory, and the handlers of SIGINT and SIGTERM.
     """
     with (
         _ALONE,
@@ -66,9 +66,11 @@ def quiet() -> Iterator[None]:
 
 @contextmanager
 def _process_as_it_was() -> Iterator[None]:
-    """Puts back the working directory and, in the main thread, the handlers of SIGINT and SIGTERM."""
-    listening = threading.current_thread() is threading.main_thread()
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)} if listening else {}
+    """Restore the working directory and, in the main thread, the handlers of SIGINT and SIGTERM."""
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    handlers = (
+        {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)} if in_main_thread else {}
+    )
     directory = None
     with suppress(OSError):  # it may have been removed
         directory = os.getcwd()
@@ -85,29 +87,29 @@ def _process_as_it_was() -> Iterator[None]:
 
 @contextmanager
 def _descriptors_silenced() -> Iterator[None]:
-    """Sends what is written to the descriptors of standard output and error nowhere, as code in C does."""
-    kept: dict[int, int] = {}
+    """Redirect the descriptors of standard output and error, to which code in C writes, to the null device."""
+    saved: dict[int, int] = {}
     try:
         with suppress(OSError):  # one that is closed needs no silence
             for descriptor in (1, 2):
-                kept[descriptor] = os.dup(descriptor)
-        if kept:
+                saved[descriptor] = os.dup(descriptor)
+        if saved:
             nowhere = os.open(os.devnull, os.O_WRONLY)
-            for descriptor in kept:
+            for descriptor in saved:
                 os.dup2(nowhere, descriptor)
             os.close(nowhere)
         yield
     finally:
-        for descriptor, original in kept.items():
+        for descriptor, original in saved.items():
             os.dup2(original, descriptor)
             os.close(original)
 
 
 @contextmanager
 def contained(name: str, when: str = "", own: bool = False) -> Iterator[None]:
-    """Runs code of others: what it prints and warns of is dropped, what it raises, ``sys.exit`` too, is PeerFailed.
+    """Run third-party code: output and warnings are suppressed, what it raises, ``sys.exit`` too, becomes PeerFailed.
 
-    when: what it was doing, for the message.  own: whether it is code of this program, whose own errors pass.
+    when: the action, for the message.  own: whether it is code of this program, whose own errors pass.
     KeyboardInterrupt passes.
     """
     try:
@@ -129,7 +131,7 @@ def _did(error: BaseException) -> str:
 
 
 def said(what: object) -> str:
-    """Text of others, as one line of at most 200 characters that can be shown."""
+    """Third-party text as one printable line of at most 200 characters."""
     try:
         text = str(what)
     except Exception:  # no message can be made
@@ -169,7 +171,7 @@ class Declared:
         precision: Precision,
         xi: Sequence[Fraction] | None,
     ) -> None:
-        """Raises Unsupported for a motion of ``system`` to the time ``end`` that is not among what is declared."""
+        """Raises Unsupported for a motion of ``system`` to the time ``end`` outside of the declared capabilities."""
         if self.is_singular(start.gamma):
             raise Unsupported(f"{name} declares that its coordinates are singular at this start.", "Give another γ.")
         if self.attitude == "quaternion" and abs(dot(start.gamma, start.gamma) - 1) > _OFF_SPHERE:
@@ -178,13 +180,13 @@ class Declared:
             raise Unsupported(f"{name} declares that it does not carry the attitude.", "Ask for no attitude.")
         direction = "backward" if end < 0 else "forward"
         generic = f"{precision.family}:BITS"
-        asked = (
+        requirements = (
             ("the system", system.name, self.systems, (system.name,)),
             ("the direction", direction, self.directions, (direction,)),
             ("the format", precision.name, self.precisions, (precision.name, generic)),
         )
-        for what, value, declared, forms in asked:
-            if declared is not None and not set(forms) & set(declared):
+        for what, value, declared, names in requirements:
+            if declared is not None and not set(names) & set(declared):
                 can = ", ".join(declared) or "none"
                 raise Unsupported(f"{name} declares that it cannot do {what} {value}.", f"It can do: {can}.")
 
@@ -193,7 +195,7 @@ class Declared:
         return any(_along(gamma, direction) for direction in self.singular_at)
 
     def step(self, name: str, step: Fraction, times: Sequence[Fraction]) -> Fraction:
-        """The step to ask for: of a fixed grid the largest up to ``step`` of which all times are multiples.
+        """The step to request: on a fixed grid the largest up to ``step`` of which all times are multiples.
 
         Raises Unsupported where that is a small part of ``step``.
         """
@@ -212,13 +214,13 @@ class Declared:
 
 
 def _along(gamma: Vector, direction: Vector) -> bool:
-    """Whether two directions are one, to within 1e-6 rad."""
+    """Whether two directions are equal to within 1e-6 rad."""
     across, along = cross(gamma, direction), dot(gamma, direction)
     return along > 0 and dot(across, across) <= _OFF_SPHERE**2 * along**2
 
 
 def quaternion(problem: Problem) -> tuple[Fraction, ...]:
-    """(w, x, y, z) of the start, to many digits more than the format has: about the vertical as ξ says, if given."""
+    """(w, x, y, z) of the start, to many digits more than the format; the rotation about the vertical is that of ξ."""
     gamma = problem.start.gamma
     xi = perpendicular(gamma) if problem.xi is None else problem.xi
     return near_quaternion(rows_of(gamma, xi), 2 * problem.precision.bits)

@@ -25,7 +25,7 @@ from heavytop.top.heavy_top import HeavyTop, State, check_times
 
 _WIDE = {7: "Ω and a quaternion", 9: "Ω, γ and ξ"}
 FINEST = Fraction(1, 10**15)
-"""The tolerance of a peer where none is asked for: below about 4 eps most refuse."""
+"""The default tolerance of a peer: below about 4 eps most refuse."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +85,8 @@ class Solution:
 
     states: as wide as the start, shape (m, 6), (m, 9) or (m, 7), one for each of the first m <= n times.  reached: the
     last time it stood at.  evaluations: of the field.  compile: seconds of the run that went into compiling.
-    outcome: how a run that did not come to the end failed; :func:`double_peer` sees by itself to the rest.
-    tolerance: in force, as text, where the library does not take the one asked for.
+    outcome: how a run that did not reach the end failed; :func:`double_peer` determines every other outcome.
+    tolerance: in force, as text, where the library does not take the requested one.
     """
 
     states: Any
@@ -225,7 +225,7 @@ def _given(name: str, control: str, problem: Problem, times: Sequence[Fraction],
 def _from_start(name: str, request: Request, solve: Solve) -> Solution:
     """The solution of ``solve`` at the times after 0, which most libraries refuse, behind the start itself."""
     at_start = int(request.times[0] == 0)
-    # the times are judged by as they were, whatever is done to those that are given
+    # a copy: a solver may change its argument, and the result is judged by these times
     later = replace(request, times=request.times[at_start:].copy())
     solved = solve(later) if len(later.times) else Solution(numpy.empty((0, request.width)), 0.0, 0, 0)
     if not isinstance(solved, Solution):
