@@ -1,7 +1,7 @@
 """Integrators that are programs: text over standard input and output, one item per line, one process for many requests.
 
-The protocol is in docs/gate.md.  A :class:`Command` is the program as a TOML table describes it, and its
-:meth:`Command.integrate` the call of :mod:`heavytop.integrate.peers`; a :class:`Session` is its running process.
+The protocol is in docs/gate.md.  A :class:`Command` is the program that a TOML table describes, its
+:meth:`Command.integrate` is the call of :mod:`heavytop.integrate.peers`, and a :class:`Session` is its running process.
 Whatever the program does becomes a Trajectory that keeps the contract or PeerFailed, and its process group ends with
 this process.
 """
@@ -43,37 +43,37 @@ from heavytop.written_numbers import number as written_number
 
 HELLO = "heavytop-integrator 1"
 PYTHON = "{python}"
-"""In a command, the interpreter that heavytop runs on."""
+"""In a command, the Python interpreter of heavytop."""
 NOT_COUNTED = {"steps": "not counted"}
-"""The flag of a run whose program did not say how many steps it took."""
+"""The flag of a run whose program did not report its number of steps."""
 _MOST_LINE = 1 << 20
 _MOST_ERRORS = 2000
 _CHUNK = 1 << 16
 _LOOK = 0.1
 """Seconds between two checks that a silent program still runs."""
 _AWAKE = 2e-4
-"""Seconds of busy waiting for an answer: waking up takes 1e-4."""
+"""Seconds of busy waiting for an answer: a wake-up takes 1e-4."""
 _FAREWELL = 0.3
 """Seconds that a program has to end after `quit`."""
 _MOST_OVERHEAD = 1e-3
-"""The most seconds of a request without times that are subtracted; a program may do in it what it likes."""
+"""At most so many seconds of a request without times are subtracted: a program may do anything in it."""
 _LEAST_SHARE = 0.1
-"""The least fraction of the seconds of a request that remains: less than its noise is not measured."""
+"""The smallest fraction of the seconds of a request that remains: noise prevents finer measurements."""
 _RESOLUTION = 1e-4
-"""Seconds by which requests without times differ, on a busy machine; fewer are not resolved."""
+"""Scatter in seconds of requests without times on a busy machine; shorter times are not resolved."""
 _DECIMAL = rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _STATE_OF_DOUBLES = {width: re.compile(rb"state(?:[ \t]+" + _DECIMAL + rb"){%d}" % (1 + width)) for width in (6, 7, 9)}
 _PAIRS = {"steps": int, "evaluations": int, "seconds": float, "joint": float}
 
 
 class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A program that integrates, as the table `[[integrator]]` describes it.
+    """A program that integrates, described by a table `[[integrator]]`.
 
-    name: in rows.  command: the program and its arguments, relative to ``folder``.  setting: its control.
+    name: in rows.  command: program and arguments, relative to ``folder``.  setting: its control parameter.
     precisions, systems, directions, attitude, one_step, fixed_grid, singular_at: its declared capabilities, as
     :class:`heavytop.integrate.peers.contract.Declared`.  timeout: seconds of one request.
-    hex: whether it is sent hexadecimal numbers.  bodies: whether it is sent a body with mass, gravity and the tensor
-    about the centre of mass.  folder: of the file; its working directory.
+    hex: whether it reads hexadecimal numbers.  bodies: whether it reads a body with mass, gravity and the tensor about
+    the centre of mass.  folder: of the file; its working directory.
     """
 
     name: str
@@ -95,7 +95,7 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
     @property
     def control(self) -> str:
-        """The control that it takes: "step", "tolerance", or "" for neither."""
+        """Its control parameter: "step", "tolerance", or "" for neither."""
         return "" if self.setting == "none" else self.setting
 
     @property
@@ -111,7 +111,7 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         return Declared(*able, self.one_step, self.fixed_grid, singular)
 
     def request(self, problem: Problem, times: Sequence[Fraction], setting: Fraction | None) -> ProgramRequest:
-        """A request in the form that it declares; raises Unsupported where it needs a body that cannot be."""
+        """A request in its declared form; raises Unsupported if it needs a body and none has these moments."""
         top = (problem.given or (problem.top, problem.start))[0]
         body = Body.realising(top) if self.bodies else None
         if self.bodies and body is None:
@@ -124,13 +124,13 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
     def argv(self) -> list[str]:
         """The program as an absolute path and its arguments; raises PeerFailed if it is missing."""
-        program, *rest = (sys.executable if part == PYTHON else part for part in self.command)
+        program, *arguments = (sys.executable if part == PYTHON else part for part in self.command)
         path = str(Path(self.folder, program)) if "/" in program else shutil.which(program) or ""
         if not os.path.isfile(path):
             raise PeerFailed(f"{self.name}: the program {said(program)} does not exist")
         if not os.access(path, os.X_OK):
             raise PeerFailed(f"{self.name}: {said(program)} is not executable")
-        return [os.path.abspath(path), *rest]
+        return [os.path.abspath(path), *arguments]
 
     def integrate(
         self,
@@ -143,11 +143,11 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         xi: tuple[Fraction, ...] | None = None,
         **control: Fraction,
     ) -> Trajectory:
-        """The call of :mod:`heavytop.integrate.peers`; its seconds are those of the request less an empty one.
+        """The call of :mod:`heavytop.integrate.peers`; it is timed without the overhead of a request.
 
-        Raises Unsupported for what the program declares that it cannot do, InputError for a control that it does not
-        have, PeerFailed for whatever else goes wrong.  A program that says ``failed`` is a Trajectory to there whose
-        outcome is ``failed``.
+        Raises Unsupported for requests outside of the declared capabilities, InputError for a control parameter that
+        the program does not have, PeerFailed for any other fault.  If the program reports ``failed``, the result is the
+        Trajectory so far with the outcome ``failed``.
         """
         instants = check_times(times)
         declared = self.declared
@@ -180,13 +180,13 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         return exact(number(value, precision))
 
     def default(self, precision: Precision) -> Fraction | None:
-        """The default of its control: the step 1/100 as a number of the format, or the eps of the format."""
+        """The default of its control parameter: the step 1/100 rounded to the format, or the eps of the format."""
         if self.control == "step":
             return exact(number(DEFAULT_STEP, precision))
         return precision.eps if self.control else None
 
     def _trajectory(self, request: ProgramRequest, reply: Reply, seconds: float) -> Trajectory:
-        problem, done = request.problem, len(reply.states)
+        problem, reached = request.problem, len(reply.states)
         flags = {self.control: number_text(request.control, problem.precision)} if request.control else {}
         steps = reply.counts.get("steps")
         if steps is None and self.control == "step" and not reply.failure:
@@ -200,17 +200,17 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         if request.quaternion:
             states = [of_quaternion(self.name, problem, state) for state in states]
         spent = {"compile": 0.0, "run": seconds} | ({UNRESOLVED_SECONDS: _RESOLUTION} if seconds < _RESOLUTION else {})
-        own_seconds = reply.counts.get("seconds")
+        program_seconds = reply.counts.get("seconds")
         return Trajectory(
             problem,
             self.name,
-            tuple(request.times[:done]),
+            tuple(request.times[:reached]),
             tuple(states),
             Outcome.FAILED if reply.failure else Outcome.SUCCESS,
-            request.times[done - 1] if done else Fraction(0),
+            request.times[reached - 1] if reached else Fraction(0),
             int(steps or 0),
             self.order,
-            spent if own_seconds is None else spent | {"program": own_seconds},
+            spent if program_seconds is None else spent | {"program": program_seconds},
             flags,
             reply.counts.get("evaluations"),
             joint_violation=reply.counts.get("joint"),
@@ -218,7 +218,7 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 def number_text(value: Fraction, precision: Precision, hexadecimal: bool = False) -> str:
-    """A number of the format as text that is exactly that number once it is read in the format."""
+    """Text of a number of the format that reads back as exactly this number."""
     if hexadecimal:
         return f"{'-' if value < 0 else ''}0x{abs(value.numerator):x}p{1 - value.denominator.bit_length()}"
     return f"{float(value):.17g}" if precision == DOUBLE else decimal_text(value, precision.digits)
@@ -226,11 +226,11 @@ def number_text(value: Fraction, precision: Precision, hexadecimal: bool = False
 
 @dataclass(frozen=True, slots=True)
 class ProgramRequest:
-    """A problem with its times, as it is sent to a program.
+    """A problem with its times, as the text sent to a program.
 
-    times: exact numbers of the format; none for a request that does nothing.  control: of the format, or None.
-    hexadecimal: the form of its numbers.  quaternion: whether the program computes with one: it is sent that of the
-    start, and answers (Ω, w, x, y, z).  body: for a program that is sent one.
+    times: exact numbers of the format; none for an empty request.  control: a number of the format, or None.
+    hexadecimal: form of the numbers.  quaternion: whether the program computes with one: it receives that of the start,
+    and answers (Ω, w, x, y, z).  body: for a program that reads one.
     """
 
     problem: Problem
@@ -242,11 +242,11 @@ class ProgramRequest:
 
     @property
     def width(self) -> int:
-        """Numbers of a state of the answer."""
+        """The components of a state of the answer."""
         return 7 if self.quaternion else 6 if self.problem.xi is None else 9
 
     def text(self, label: int) -> bytes:
-        """Its lines."""
+        """The lines of the request."""
         p, precision = self.problem.parameters, self.problem.precision
         rotor = (0, p.rotor, 0) if self.problem.system is GYROSTAT else p.rotors if len(p.rotors) == 3 else (0, 0, 0)
         lines = {
@@ -281,7 +281,7 @@ class ProgramRequest:
 
 
 class Reply:
-    """The answer of a program: states of the format, counts, and the failure that it reports; wall: seconds here."""
+    """The answer of a program: states, counts, and a reported failure; wall: its seconds, measured here."""
 
     def __init__(self, name: str, request: ProgramRequest) -> None:
         self.name, self.request = name, request
@@ -294,7 +294,7 @@ class Reply:
         self._pattern = _STATE_OF_DOUBLES[request.width]
 
     def take(self, line: bytes) -> bool:
-        """Read a line; True for the last one.  Raises PeerFailed for one that breaks the protocol."""
+        """Read a line; return whether it is the last.  Raises PeerFailed for a line that breaks the protocol."""
         if self._doubles and self._pattern.fullmatch(line):
             time, *values = map(float, line.split()[1:])
             if (
@@ -366,9 +366,9 @@ class Reply:
 
 
 class Session:
-    """A running program, which serves one request after the other.
+    """A running program, which serves requests one after another.
 
-    A caller that gets an exception ends it with :meth:`close`.  greeting: the text after ``ready``.
+    After an exception the caller must :meth:`close` it.  greeting: the text after ``ready``.
     """
 
     def __init__(self, command: Command) -> None:
@@ -406,7 +406,7 @@ class Session:
             raise
 
     def _greet(self, line: bytes) -> bool:
-        """Take the first line of the program; raises PeerFailed for another than ``ready NAME VERSION``."""
+        """Read the first line of the program; raises PeerFailed unless it is ``ready NAME VERSION``."""
         text = line.decode("utf-8", "replace")
         if text.split()[:1] != ["ready"]:
             raise PeerFailed(f"{self.name} began with {said(repr(text))} instead of ready NAME VERSION")
@@ -414,74 +414,74 @@ class Session:
         return True
 
     def empty_request(self, problem: Problem) -> float:
-        """Seconds of a request without times, which begins each row: the minimum over this process, at most 1 ms."""
+        """Seconds of a request without times, made once per row: the minimum over this process, at most 1 ms."""
         if not self._began_row:
-            for _ in range(1 if self.requests else 2):  # the first of a process is slow
+            for _ in range(1 if self.requests else 2):  # the first request of a process is slow
                 wall = self.ask(self.command.request(problem, [], None)).wall
                 self._overhead = min(self._overhead, wall)
             self._began_row = True
         return self._overhead
 
     def end_row(self) -> None:
-        """The next request begins a row."""
+        """Let the next request begin a row."""
         self._began_row = False
 
     @property
     def lost_between_rows(self) -> bool:
-        """Whether the program ended by itself after the last request of a row."""
+        """Whether the program ended by itself between two rows."""
         return not self._began_row and self.process.poll() is not None
 
-    def ask(self, request: ProgramRequest, most: float = inf) -> Reply:
-        """The answer to a request; raises PeerFailed for one that breaks the protocol, and after the timeout, or after
-        ``most`` seconds where these are fewer.
+    def ask(self, request: ProgramRequest, limit: float = inf) -> Reply:
+        """The answer to a request; raises PeerFailed if it breaks the protocol, or takes longer than the timeout or
+        ``limit`` seconds.
         """
         self.requests += 1
         reply = Reply(self.name, request)
         text = request.text(self.requests)
         seconds = stopwatch(self.process.pid)
-        reply.wall = seconds(self._exchange(text, reply.take, "done", most))
+        reply.wall = seconds(self._exchange(text, reply.take, "done", limit))
         return reply
 
     def _exchange(self, text: bytes, take: Callable[[bytes], bool], awaited: str, seconds: float = inf) -> float:
-        """Write ``text`` and pass on line after line until ``take`` has its last; nothing may be left then.
+        """Write ``text``, and pass lines to ``take`` until it returns True; no output may follow.
 
-        Returns for how many seconds this thread had no processor since it last found nothing to read.
+        Returns the seconds without a processor of this thread since it last found nothing to read.
         """
         began, seconds = monotonic(), min(seconds, self.command.seconds)
-        deadline, awake_until, looked = began + seconds, began + _AWAKE, waited_for_processor()
-        waiting = self._write(memoryview(text))
-        if waiting:
+        deadline, awake_until, idle_since = began + seconds, began + _AWAKE, waited_for_processor()
+        unsent = self._write(memoryview(text))
+        if unsent:
             self._poll.register(self._in, select.POLLOUT)
         while True:
-            if waiting and not (waiting := self._write(waiting)):
+            if unsent and not (unsent := self._write(unsent)):
                 self._poll.unregister(self._in)
             if self._lines(take):
-                return waited_for_processor() - looked
-            left = deadline - monotonic()
-            if left <= 0:
+                return waited_for_processor() - idle_since
+            remaining = deadline - monotonic()
+            if remaining <= 0:
                 raise self._failed(f"did not say {awaited} within {seconds:g} s", answered=True)
-            awake = not waiting and monotonic() < awake_until
+            busy_waiting = not unsent and monotonic() < awake_until
             waited = waited_for_processor()
             events = self._poll.poll(0)
             if not events:
-                looked = waited
-                if awake:
+                idle_since = waited
+                if busy_waiting:
                     continue
-                events = self._poll.poll(1000 * min(left, _LOOK))
+                events = self._poll.poll(1000 * min(remaining, _LOOK))
             if not events and self.process.poll() is not None and not self._drained():
                 raise self._failed(f"{self._end()} before it said {awaited}")
             self._receive([descriptor for descriptor, _ in events], awaited)
 
-    def _write(self, waiting: memoryview) -> memoryview:
+    def _write(self, unsent: memoryview) -> memoryview:
         with suppress(BlockingIOError):
             try:
-                waiting = waiting[os.write(self._in, waiting) :]
+                unsent = unsent[os.write(self._in, unsent) :]
             except BrokenPipeError:  # it reads no more; what it wrote before is still read
-                waiting = memoryview(b"")
-        return waiting
+                unsent = memoryview(b"")
+        return unsent
 
     def _lines(self, take: Callable[[bytes], bool]) -> bool:
-        """Pass on the whole lines received so far."""
+        """Pass the complete lines received so far to ``take``; whether the last one was among them."""
         if b"\n" not in self._unread:
             if len(self._unread) > _MOST_LINE:
                 raise self._failed(f"wrote a line of more than {_MOST_LINE} characters")
@@ -508,13 +508,13 @@ class Session:
             self._unread += data or b""
 
     def _drained(self) -> bool:
-        """Whether a program that has ended left something to read."""
+        """Whether a program that has ended left unread output."""
         data = self._read(self._out)
         self._unread += data or b""
         return bool(data)
 
     def _read(self, descriptor: int) -> bytes | None:
-        """The bytes available; empty at the end of the file, None where there are none yet."""
+        """The available bytes; empty at the end of the file, None if there are none yet."""
         try:
             return os.read(descriptor, _CHUNK)
         except BlockingIOError:
@@ -534,7 +534,7 @@ class Session:
         return "closed its output"
 
     def _failed(self, what: str, answered: bool = False) -> PeerFailed:
-        """The failure, with the last lines of the program's standard error."""
+        """The error, with the last lines of the program's standard error."""
         for _ in range(4):
             self._read_errors()
         lines = [said(line) for line in self._errors.decode("utf-8", "replace").splitlines() if line.strip()]
@@ -542,7 +542,7 @@ class Session:
         return PeerFailed(f"{self.name} {what}{ending}", answered=answered)
 
     def ends_after(self, text: bytes, seconds: float) -> bool:
-        """Whether the program ends by itself within so many seconds of ``text`` and the end of its input."""
+        """Whether the program ends by itself within ``seconds`` of ``text``; its input is closed if that is empty."""
         with suppress(OSError):
             os.write(self._in, text)
         if not text:
@@ -571,7 +571,7 @@ _lock = Lock()
 
 @contextmanager
 def session(command: Command) -> Iterator[Session]:
-    """A running program for this thread alone; it is ended where anything raises, else kept for the next request."""
+    """A running program for this thread alone; closed if the block raises, else kept for the next request."""
     with _lock:
         sessions = _idle.get(command, [])
         program = sessions.pop() if sessions else None
@@ -589,7 +589,7 @@ def session(command: Command) -> Iterator[Session]:
 
 
 def begin_row() -> None:
-    """The next request to each program is preceded by one without times, whose seconds are the cost of asking."""
+    """Let each program serve a request without times before the next one: its seconds are the overhead."""
     with _lock:
         for programs in _idle.values():
             for program in programs:
@@ -609,7 +609,7 @@ atexit.register(close_all)
 
 
 def greeting(command: Command) -> str:
-    """Name and version as the program says them; raises PeerFailed where it does not within its timeout."""
+    """Name and version that the program reports; raises PeerFailed after its timeout."""
     program = Session(command)
     program.close(_FAREWELL)
     return program.greeting

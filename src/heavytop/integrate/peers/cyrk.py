@@ -20,7 +20,7 @@ def _machine_code(system: System, width: int) -> Any:
 
 @OncePerArguments
 def _warm(system: System, width: int, method: str) -> None:
-    """Compiles what a first call would compile."""
+    """Compile what the first call would compile."""
     _call(Request(system, numpy.zeros(width), numpy.ones(1), numpy.ones(count(system)), 1e-3), method).free()
 
 

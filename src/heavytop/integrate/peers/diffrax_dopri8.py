@@ -21,7 +21,7 @@ _MOST_STEPS = 2**24
 
 @OncePerArguments
 def _compiled(system: System, width: int, samples: int) -> Callable[..., Any]:
-    """The integration of so many numbers to so many times as machine code."""
+    """The integration of states of ``width`` to ``samples`` times as machine code."""
     read = reader(system)
 
     def field(_time: Any, y: Any, n: Any) -> Any:
@@ -37,7 +37,7 @@ def _compiled(system: System, width: int, samples: int) -> Callable[..., Any]:
             start,
             numbers,
             saveat=diffrax.SaveAt(ts=times),
-            # where the field is not finite every step is refused: without a least one it would never end
+            # every step is rejected where the field is not finite: without a smallest step it would never end
             stepsize_controller=diffrax.PIDController(
                 rtol=tolerance, atol=tolerance, dtmin=_LEAST_STEP * abs(times[-1]), force_dtmin=False
             ),
@@ -50,12 +50,12 @@ def _compiled(system: System, width: int, samples: int) -> Callable[..., Any]:
 
 
 def _solve(request: Request) -> Solution:
-    # settings of this thread and this block alone: the user's jax stays what it is
+    # for this thread and block alone: the user's jax settings stay
     with jax.enable_x64(True), jax.default_device(jax.devices("cpu")[0]):
         code, seconds = timed(_compiled, request.system, request.width, len(request.times))
         run = code(request.start, request.times, request.numbers, request.control)
         states = numpy.asarray(jax.block_until_ready(run.ys))
-    # diffrax fills what it did not reach with infinities
+    # diffrax fills states that it did not reach with infinities
     unreached = numpy.isinf(states).all(axis=1)
     if run.result != diffrax.RESULTS.successful and unreached.any():
         states = states[: int(numpy.argmax(unreached))]

@@ -1,4 +1,4 @@
-"""Adapters of libraries for doubles: the problem as arrays, the field as compiled code, the result as a Trajectory."""
+"""Adapters for libraries in double: the problem as arrays, the field as compiled code, the result as a Trajectory."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ FINEST = Fraction(1, 10**15)
 class Request:
     """A problem in double.
 
-    start: shape (6,), or (9,) with ξ behind where the attitude is asked for, or (7,), Ω and a quaternion, where that is
-    declared.  times: shape (n,), strictly monotone away from 0.  numbers: the parameters I, n and the rotor: shape (7,)
-    with λ, 0 for the heavy top, or (9,) with k for the heavy gyrostat.
+    start: shape (6,), or (9,) with ξ if the attitude is requested, or (7,), Ω and a quaternion, if that is declared.
+    times: shape (n,), strictly monotone away from 0.  numbers: the parameters I, n and the rotor: shape (7,) with λ, 0
+    for the heavy top, or (9,) with k for the heavy gyrostat.
     control: the tolerance, or the step of a method with fixed steps; ``setting`` is its former name.
     step_limit: steps after which an adaptive method
-    should give up, with the states so far and ``Outcome.STEP_LIMIT``.
+    should stop, with the states so far and ``Outcome.STEP_LIMIT``.
     """
 
     system: System
@@ -54,12 +54,12 @@ class Request:
 
     @property
     def parameters(self) -> Parameters:
-        """The numbers as ``system.field`` takes them: Python's, which are faster one at a time than an array's."""
+        """The arguments of ``system.field``, as Python floats: as scalars faster than elements of an array."""
         return reader(self.system)(self.numbers.tolist())
 
     @property
     def field(self) -> Callable[[Sequence[float]], tuple[float, ...]]:
-        """y -> y', six numbers (Ω', γ'), nine with ξ' behind, or seven (Ω', q'): as many as ``start`` has."""
+        """y -> y' of the shape of ``start``: (Ω', γ'), (Ω', γ', ξ') or (Ω', q')."""
         if self.width == 7:
             return self._with_quaternion
         return partial(self.system.with_attitude, self.parameters)
@@ -75,7 +75,7 @@ class Request:
 
     @property
     def width(self) -> int:
-        """Numbers of a state: 6, 9 with ξ, or 7 with a quaternion."""
+        """The components of a state: 6, 9 with ξ, or 7 with a quaternion."""
         return len(self.start)
 
 
@@ -84,7 +84,7 @@ class Solution:
     """The result of a library.
 
     states: as wide as the start, shape (m, 6), (m, 9) or (m, 7), one for each of the first m <= n times.  reached: the
-    last time it stood at.  evaluations: of the field.  compile: seconds of the run that went into compiling.
+    last time reached.  evaluations: of the field.  compile: seconds of the run spent on compiling.
     outcome: how a run that did not reach the end failed; :func:`double_peer` determines every other outcome.
     tolerance: in force, as text, where the library does not take the requested one.
     """
@@ -100,7 +100,7 @@ class Solution:
 
 Solve = Callable[[Request], Solution]
 Given, Solved = Request, Solution
-"""The names under which packages of others import them."""
+"""Former names, which third-party packages import."""
 
 
 def double_peer(
@@ -150,18 +150,18 @@ def double_peer(
     declared = Declared(*able, attitude, one_step, fixed_grid, singular)
 
     def integrate(problem: Problem, times: Sequence[Fraction], value: Fraction) -> Trajectory:
-        request = _given(name, control, problem, times, value)
+        request = _request(name, control, problem, times, value)
         if declared.attitude == "quaternion":
             q = problem.native(quaternion(problem))
             request = replace(request, start=numpy.array([*request.start[:3], *q], dtype=float))
         began = perf_counter()
-        solved = _from_start(name, request, solve)
+        solved = _solution_with_start(name, request, solve)
         seconds = {"compile": solved.compile, "run": perf_counter() - began - solved.compile}
         flags = {
             control: solved.tolerance or repr(request.control),
-            "field": "numba" if find_spec("numba") else "python",  # not loaded where nobody needs it
+            "field": "numba" if find_spec("numba") else "python",  # without importing it
         }
-        return _judged(problem, name, order, request, solved, seconds, flags)
+        return _trajectory(problem, name, order, request, solved, seconds, flags)
 
     def with_step(
         top: HeavyTop,
@@ -190,9 +190,9 @@ def fixed_steps(
     state: Callable[[Doubles], Doubles] = numpy.copy,
     compile: float = 0.0,
 ) -> Solution:
-    """The solution by steps of one length between two times, no longer than the control of the request.
+    """The solution by equal steps between two times, no longer than the step of the request.
 
-    y: the beginning, which ``advance(y, h, count)`` moves by so many steps.  state: a copy of y as a state.
+    y: the initial value; ``advance(y, h, count)`` advances it in place by ``count`` steps.  state: y as a new state.
     """
     states, time, steps = [], 0.0, 0
     for end in request.times:
@@ -210,7 +210,7 @@ def _declared(names: Sequence[str] | None) -> tuple[str, ...] | None:
     return None if names is None else tuple(names)
 
 
-def _given(name: str, control: str, problem: Problem, times: Sequence[Fraction], value: Fraction) -> Request:
+def _request(name: str, control: str, problem: Problem, times: Sequence[Fraction], value: Fraction) -> Request:
     if problem.precision != DOUBLE:
         raise Unsupported(f"{name} has no {problem.precision.name}.", "Use double.")
     if value <= 0 or (control == "tolerance" and value > 1):
@@ -222,7 +222,7 @@ def _given(name: str, control: str, problem: Problem, times: Sequence[Fraction],
     return Request(problem.system, start, grid, numbers, float(value))
 
 
-def _from_start(name: str, request: Request, solve: Solve) -> Solution:
+def _solution_with_start(name: str, request: Request, solve: Solve) -> Solution:
     """The solution of ``solve`` at the times after 0, which most libraries refuse, behind the start itself."""
     at_start = int(request.times[0] == 0)
     # a copy: a solver may change its argument, and the result is judged by these times
@@ -240,7 +240,7 @@ def _from_start(name: str, request: Request, solve: Solve) -> Solution:
     return replace(solved, states=numpy.concatenate([[request.start], states]))
 
 
-def _judged(
+def _trajectory(
     problem: Problem,
     name: str,
     order: int,
@@ -286,7 +286,7 @@ def _states(name: str, returned: Any, count: int, width: int) -> Any:
 
 @OncePerArguments
 def compiler() -> Callable[[Any], Any]:
-    """numba's ``njit``, taught the vector product of this program; the identity where numba is not installed."""
+    """numba's ``njit`` with the cross product of this program; the identity if numba is not installed."""
     try:
         import numba
         from numba.extending import overload
@@ -298,22 +298,22 @@ def compiler() -> Callable[[Any], Any]:
 
 
 def reader(system: System) -> Callable[[Any], Parameters]:
-    """A function from the numbers of :class:`Request` to the parameters of the field, which numba compiles."""
+    """A function that numba compiles, from the numbers of :class:`Request` to the parameters of the field."""
     if system is HEAVY_GYROSTAT:
         return lambda n: Parameters((n[0], n[1], n[2]), (n[3], n[4], n[5]), (n[6], n[7], n[8]))
     return lambda n: Parameters((n[0], n[1], n[2]), (n[3], n[4], n[5]), n[6])
 
 
 def count(system: System) -> int:
-    """How many numbers of :class:`Request` a system has."""
+    """The length of ``numbers`` of a :class:`Request` for a system."""
     return 9 if system is HEAVY_GYROSTAT else 7
 
 
 @OncePerArguments
 def fill(system: System, width: int = 6) -> Callable[..., None]:
-    """(rates, t, y, numbers): writes the field at y, of ``width`` numbers, 6 or 9 with ξ, into ``rates``.
+    """A function (rates, t, y, numbers) that writes the field at y into ``rates``; width: of y, 6, or 9 with ξ.
 
-    All but ``t`` are arrays, or pointers in machine code.
+    Its arguments except ``t`` are arrays, or pointers in machine code.
     """
     jit = compiler()
     field, velocity, read = jit(system.field), jit(system.angular_velocity), jit(reader(system))
@@ -339,7 +339,7 @@ def fill(system: System, width: int = 6) -> Callable[..., None]:
 
 @OncePerArguments
 def rates(system: System, width: int = 6) -> Callable[..., Any]:
-    """(t, y, numbers) -> the field at y as a new array; machine code where numba is installed."""
+    """(t, y, numbers) -> the field at y as a new array; machine code if numba is installed."""
     write = compiler()(fill(system, width))
 
     def rates(time: float, y: Any, numbers: Any) -> Any:
@@ -353,7 +353,7 @@ def rates(system: System, width: int = 6) -> Callable[..., Any]:
 
 
 def timed(make: Callable[..., Any], *arguments: Any) -> tuple[Any, float]:
-    """``make(*arguments)`` and the seconds it took: what compiles something at its first call."""
+    """``make(*arguments)`` and its seconds, for a function that compiles at its first call."""
     began = perf_counter()
-    made = make(*arguments)
-    return made, perf_counter() - began
+    result = make(*arguments)
+    return result, perf_counter() - began

@@ -1,4 +1,4 @@
-"""Other forms of heyoka's Taylor method in the peers' call: compiled for one top, and eight motions at once."""
+"""Variants of heyoka's Taylor method as peers: compiled for one top, and with eight motions in SIMD lanes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from heavytop.precision import DOUBLE
 
 @with_tolerance
 def constants(problem: Problem, times: Sequence[Fraction], tolerance: Fraction | None) -> Trajectory:
-    """heyoka with the top's numbers compiled into its code, anew for each top; the peers are given them at run time."""
+    """heyoka with the parameters as constants of its code, compiled for each top; peers take them at run time."""
     assert problem.given is not None
     run = propagate(
         *problem.given,

@@ -31,12 +31,12 @@ def odefun(problem: Problem, times: Sequence[Fraction], tolerance: Fraction | No
         raise InputError("mpmath.odefun integrates forwards only.", "Give positive times.")
     evaluations = 0
     began = perf_counter()
-    # a context of this run's own: that of the module is one for all threads
-    own = mpmath.ctx_mp.MPContext()
-    own.prec = precision.bits
+    # a new context, for that of the module is shared by all threads
+    context = mpmath.ctx_mp.MPContext()
+    context.prec = precision.bits
 
     def big(value: Fraction) -> Any:
-        return own.mpf(value.numerator) / value.denominator
+        return context.mpf(value.numerator) / value.denominator
 
     def rates(_time: Any, y: Any) -> list[Any]:
         nonlocal evaluations
@@ -45,7 +45,7 @@ def odefun(problem: Problem, times: Sequence[Fraction], tolerance: Fraction | No
 
     p = problem.parameters.mapped(lambda value: big(Fraction(value)))
     wanted = None if tolerance is None else big(tolerance)
-    solve = own.odefun(rates, 0, [big(v) for v in (*problem.start.flat, *(problem.xi or ()))], tol=wanted)
+    solve = context.odefun(rates, 0, [big(v) for v in (*problem.start.flat, *(problem.xi or ()))], tol=wanted)
     values = [[exact(v) for v in solve(big(time))] for time in grid]
     seconds = perf_counter() - began
     states = tuple(numpy.array([number(v, precision) for v in row]) for row in values)

@@ -34,9 +34,9 @@ Coefficient = Fraction | float | int
 
 @dataclass(frozen=True, slots=True)
 class Tableau:
-    """Butcher's coefficients of an explicit method; c is not needed, since the field knows no time.
+    """Butcher's coefficients of an explicit method; c is not needed: the field is autonomous.
 
-    order: of the method.  a: a row for each stage behind the first, with as many coefficients as stages before it.
+    order: of the method.  a: a row for each stage after the first, with as many coefficients as stages before it.
     b: the weights, one for each stage.
     Raises InputError for rows of another length, and for weights that do not add up to 1.
     """

@@ -1,7 +1,7 @@
-"""Integrators in Python that no package installs: a function in a file, and a callable.
+"""Python integrators outside of any package: a function in a file, and a callable.
 
-Each is a :class:`heavytop.integrate.registry.IntegratorSource`: it has a name, which rows bear, and what it needs to be
-called in another process travels with it.
+Each is a :class:`heavytop.integrate.registry.IntegratorSource`: it has the name shown in rows, and can be sent to
+another process.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class PythonFile:
         return f"{Path(self.path).name}:{self.function}"
 
     def load(self) -> Callable[..., Any]:
-        """The peer; the file is run anew where it has changed."""
+        """The peer; the file is run again if it has changed."""
         path = Path(self.path)
         try:
             status = path.stat()
@@ -45,8 +45,8 @@ class PythonFile:
             call = attrgetter(self.function)(module)
         except AttributeError:
             functions = (item for item in vars(module).values() if inspect.isfunction(item))
-            own = [item.__name__ for item in functions if item.__module__ == module.__name__]
-            remedy = f"{meant(self.function, own)}It has {', '.join(own) or 'no function'}."
+            defined = [item.__name__ for item in functions if item.__module__ == module.__name__]
+            remedy = f"{meant(self.function, defined)}It has {', '.join(defined) or 'no function'}."
             raise NoSuchFunction(f"{self.path} has no {self.function}.", remedy) from None
         return as_peer(call, self.name)
 
@@ -55,7 +55,7 @@ class PythonFile:
 class PythonObject:
     """A callable of this process.
 
-    To another process it goes by its file, where it stands at the top of a module, else by cloudpickle.
+    It is sent to another process as its file and name if it is defined at module level, else by cloudpickle.
     """
 
     name: str
@@ -80,7 +80,7 @@ class PythonObject:
 
 
 def place_of(call: Any) -> tuple[str, str]:
-    """File and name of what stands at the top of a module other than the main script; else the name behind ""."""
+    """(file, name) of an object at module level, outside of the main script; ("", name) for any other."""
     function = getattr(call, "__qualname__", type(call).__name__)
     module = sys.modules.get(getattr(call, "__module__", None) or "")
     file = getattr(module, "__file__", None) or ""
@@ -98,7 +98,7 @@ _modules: dict[Path, tuple[tuple[int, int], Any]] = {}
 
 
 def _module(path: Path, state: tuple[int, int]) -> Any:
-    """The module in that file, run once as long as it does not change; its folder can be imported from."""
+    """The module in that file, run again only if ``state`` has changed; its folder is added to ``sys.path``."""
     known = _modules.get(path)
     if known is not None and known[0] == state:
         return known[1]
@@ -121,7 +121,7 @@ def _module(path: Path, state: tuple[int, int]) -> Any:
 
 
 def as_peer(call: Any, name: str) -> Callable[..., Any]:
-    """``call`` as a peer: itself, or around a solver, which takes one argument."""
+    """``call`` as a peer: itself, or an adapter around a solver, which takes one argument."""
     if isinstance(call, type) or not callable(call):
         raise InputError(f"The integrator {name} is a {type(call).__name__}, not a function.", _FORMS)
     if inspect.iscoroutinefunction(call):

@@ -1,9 +1,9 @@
 """A structure-preserving method with fixed steps: the energy split into parts whose flows are elementary.
 
-½ M1²/I1, ½ M2²/I2, ½ M3²/I3 turn M, γ and ξ about one axis each, n·γ kicks M by γ × n; a rotor turns along, and k of a
-heavy gyrostat makes them ½ (M1 − k1)²/I1 and so on.  Each flow
-keeps |γ|² and M·γ, and is exact but for rounding.  One symmetric sequence of them has order 2 (Touma and Wisdom,
-1994; McLachlan and Quispel, Acta Numerica 2002); symmetric compositions of it have the orders 4 (Suzuki 1990) and
+½ M1²/I1, ½ M2²/I2, ½ M3²/I3 rotate M, γ and ξ about one axis each, n·γ adds a multiple of γ × n to M.  A rotor rotates
+with the body; k of a heavy gyrostat changes the parts to ½ (M1 − k1)²/I1 and so on.  Each flow conserves |γ|² and M·γ,
+and is exact up to rounding.  Their symmetric composition has order 2 (Touma and Wisdom,
+1994; McLachlan and Quispel, Acta Numerica 2002); symmetric compositions of that have the orders 4 (Suzuki 1990) and
 8 (Kahan and Li, Math. Comp. 66, 1997, 17 stages).
 """
 
@@ -49,7 +49,7 @@ STAGES = {
 
 @OncePerArguments
 def _stepper(system: System) -> Callable[..., None]:
-    """(M, γ, and ξ or not, in one array, numbers, k, h, count, stages): ``count`` steps of size h."""
+    """A function (v, numbers, k, h, count, stages): ``count`` steps of size h of v = (M, γ) or (M, γ, ξ)."""
     jit = compiler()
     field, velocity, read = jit(system.field), jit(system.angular_velocity), jit(reader(system))
     cos, sin = math.cos, math.sin

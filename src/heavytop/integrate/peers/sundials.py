@@ -1,6 +1,6 @@
 """SUNDIALS' CVODE through scikit-sundae: Adams-Moulton of variable order up to 12, for problems that are not stiff.
 
-CVODE prints why it aborts; :func:`heavytop.integrate.peers.contract.quiet` drops it, and the outcome says so.
+CVODE prints why it aborts; :func:`heavytop.integrate.peers.contract.quiet` suppresses it, and the outcome reports it.
 """
 
 from __future__ import annotations
