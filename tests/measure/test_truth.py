@@ -253,7 +253,7 @@ def test_the_first_steps_forecast_a_run_up_to_its_effort_and_not_beyond(monkeypa
 def test_runs_that_agree_to_the_last_bit_are_off_by_a_rounding_of_the_coarser() -> None:
     state = [Fraction(n, 8) for n in (1, -5, 3, 2, 0, -1)]
     for bits in (60, 100):
-        balls = truths._group_balls(state, [*state[:5], Fraction(-9, 8)], bits)
+        balls = truths._balls_by_vector(state, [*state[:5], Fraction(-9, 8)], bits)
         found = [radius(ball) * 2**bits for ball in balls]
         assert all(Fraction(5, 8) <= each < Fraction(6, 8) for each in found[:3])
         assert all(2**bits < each < 2**bits * (1 + Fraction(1, 2**28)) for each in found[3:])

@@ -25,10 +25,10 @@ from heavytop.top.heavy_top import HeavyTop, State
 if TYPE_CHECKING:
     from heavytop.measure.truth import Truth
 
-# How a trajectory file speaks of the attitude: order and direction of quaternions, Euler sequence, up, units.
+# Conventions of a trajectory file for the attitude: order and direction of quaternions, Euler sequence, up, units.
 #
-# Here R takes components in body axes to components in the axes of space of the file; canonical axes of space are those
-# whose third points up.  A file's are turned into them by a signed permutation of determinant 1.
+# R maps components in body axes to components in the space axes of the file.  The third of the canonical space axes
+# points up; a signed permutation of determinant 1 maps those of the file to them.
 
 
 UPS: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
@@ -39,16 +39,16 @@ UPS: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
     "-x": ((1, 2, 0), (-1, 1, -1)),
     "-y": ((2, 0, 1), (1, -1, -1)),
 }
-"""The axis of space that points up: canonical component k is sign k times component number k of the file."""
+"""By the space axis that points up, (indices, signs): canonical component k is sign k times component indices[k]."""
 ORDERS = ("wxyz", "xyzw")
 DIRECTIONS = ("body_to_space", "space_to_body")
 FRAMES = ("body", "space")
 ANGLES = ("radians", "degrees")
 FORMS = ("quaternion", "matrix", "euler")
-"""Columns that give a whole attitude, the first that is there before the others."""
+"""Columns that give a complete attitude, in order of precedence."""
 VECTORS = ("omega", "omega_space", "gamma", "position")
 WIDTHS = {"quaternion": 4, "matrix": 9, "euler": 3, **dict.fromkeys(VECTORS, 3)}
-"""Numbers of each quantity in a row, in the order in which they are scored and diagnosed."""
+"""Components of each quantity, in the order in which they are scored and diagnosed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +57,8 @@ class Convention:
 
     quaternion_order: "wxyz" or "xyzw".  quaternion, matrix: "body_to_space" (v_space = R v_body) or "space_to_body".
     sequence: of Euler angles, intrinsic.  angles: "radians" or "degrees".  up: the axis of space that points up.
-    pivot: where the fixed point stands in the axes of space.  point: whose position it is, in body axes; None for the
-    centre of mass.
+    pivot: the fixed point in space axes.  point: the body point of the position, in body axes; None for the centre of
+    mass.
     """
 
     quaternion_order: str = "wxyz"
@@ -85,9 +85,9 @@ class Convention:
                 raise InputError(f"{name} = {quoted(getattr(self, name))} is not known.", f"Use one of {allowed}.")
 
     def rotation(self, form: str, values: Sequence[Any], lib: Any) -> list[list[Any]]:
-        """R of the columns of ``form``, body to space of the file; of a quaternion of any length that of its direction.
+        """R from the columns of ``form``, body to space of the file; a quaternion is normalised.
 
-        values: 4, 9 (row by row) or 3 numbers.  lib: functions of these numbers, with ``pi`` where angles are degrees.
+        values: 4, 9 (row by row) or 3 numbers.  lib: functions of their type, with ``pi`` where angles are in degrees.
         """
         if form == "quaternion":
             w, x, y, z = values if self.quaternion_order == "wxyz" else (values[3], *values[:3])
@@ -100,9 +100,8 @@ class Convention:
         return [list(row) for row in rows_of_euler(self.sequence, angles, lib)]
 
     def upright(self, vector: Sequence[Any]) -> list[Any]:
-        """A vector of the file's axes of space, or three rows of R, in canonical axes of space."""
-        places, signs = UPS[self.up]
-        return [_times(vector[index], sign) for index, sign in zip(places, signs, strict=True)]
+        """A vector in the file's space axes, or three rows of R, in canonical space axes."""
+        return [_times(vector[index], sign) for index, sign in zip(*UPS[self.up], strict=True)]
 
 
 def _directed(rows: Rows[Any], direction: str) -> list[list[Any]]:
@@ -120,9 +119,9 @@ def space_to_body(rows: Rows[Any], vector: Sequence[Any]) -> tuple[Any, Any, Any
     return rotated(transposed(rows), vector)
 
 
-# Attitudes, positions and Ω in any axes, as a file gives them, compared with the true motion of the body.
+# Errors of attitudes, positions and Ω of a file, in any axes, against the reference.
 #
-# Everything is in balls: no digit is lost where two attitudes all but agree.
+# All arithmetic is in balls: no digits are lost where two attitudes nearly agree.
 
 
 ATTITUDE_ERROR, POSITION_ERROR, JOINT_VIOLATION = "attitude_error", "position_error", "joint_violation"
@@ -130,14 +129,14 @@ _WORST = Quantity(SOLUTION_ERROR, "relative")
 """The largest error of a column."""
 _ONE = arb(1)
 Values = Mapping[str, Sequence[Fraction]]
-"""The numbers of one sample by the name of the quantity."""
+"""The components of one sample by the name of the quantity."""
 
 
 @dataclass(frozen=True, slots=True)
 class Posed:
     """A body and its start in principal axes, as exact numbers.
 
-    xi: the attitude vector at t = 0; None where no attitude is asked about.  axes: rows of A, v_given = A v_principal.
+    xi: the attitude vector at t = 0; None if no attitude is requested.  axes: rows of A, v_given = A v_principal.
     centre: the centre of mass in the axes given.
     """
 
@@ -153,24 +152,24 @@ def ball_functions() -> Any:
     return SimpleNamespace(sin=FUNCTIONS.sin, cos=FUNCTIONS.cos, sqrt=FUNCTIONS.sqrt, pi=arb.pi())
 
 
-def attitude_angle(one: Sequence[Sequence[arb]], other: Sequence[Sequence[arb]]) -> arb:
+def attitude_angle(first: Sequence[Sequence[arb]], second: Sequence[Sequence[arb]]) -> arb:
     """The angle in [0, π] of the rotation from one matrix to the other.
 
     Twice atan2(s, c) with s = |R − S|/(2√2) and c² = 1 − s²: no digits are lost near 0.
     """
-    off = [a - b for u, v in zip(one, other, strict=True) for a, b in zip(u, v, strict=True)]
-    square = sum((part * part for part in off), arb(0)) / 8  # FLINT's power of a ball around 0 is nan
-    if square > _ONE:  # off a rotation
+    differences = [a - b for u, v in zip(first, second, strict=True) for a, b in zip(u, v, strict=True)]
+    square = sum((part * part for part in differences), arb(0)) / 8  # FLINT's power of a ball around 0 is nan
+    if square > _ONE:  # not a rotation
         return arb.pi()
     return 2 * arb.atan2(root(square), root(_ONE - square))
 
 
 class ObservedErrors(Statistics):
-    """Errors of what one file gives, sample by sample.
+    """Errors of the columns of one file, accumulated sample by sample.
 
-    ``attitude_error``: the angle between the true attitude and the one given, in radians; ``position_error``: a length,
-    and relative to the distance of the point from the fixed point; ``solution_error_omega`` and ``_gamma``: the largest
-    component, in the axes of the columns; ``_along`` and ``_across`` the flow where the state is whole.
+    ``attitude_error``: the angle between the true attitude and that of the file, in radians; ``position_error``: a
+    length, and relative to the distance of the point from the fixed point; ``solution_error_omega`` and ``_gamma``: the
+    largest component, in the axes of the columns; ``_along`` and ``_across`` the flow if the file gives the state.
     ``solution_error_relative``: the largest error of a column: of Ω and γ relative to a value above 1, of the nine
     entries of R, of a quaternion's length, and of a position relative to the distance of the point.
     """
@@ -180,17 +179,17 @@ class ObservedErrors(Statistics):
         problem: Problem,
         truth: Truth,
         posed: Posed,
-        said: Convention,
+        convention: Convention,
         names: Sequence[str],
         keep: Sequence[Fraction] = (),
     ) -> None:
-        self.truth, self.said, self.posed = truth, said, posed
+        self.truth, self.convention, self.posed = truth, convention, posed
         self.bits = problem.precision.bits + GUARD_BITS
         self.system = problem.system
         self.parameters = parameter_balls(problem, self.bits)
         self.keep = frozenset(keep)
         self.form = next((form for form in FORMS if form in names), None)
-        self.point = posed.centre if said.point is None else said.point
+        self.point = posed.centre if convention.point is None else convention.point
         self.distance_squared = dot(self.point, self.point)
         self.running = {quantity: RunningStatistics() for quantity in self._quantities(names)}
         self._last = 0.0
@@ -211,7 +210,7 @@ class ObservedErrors(Statistics):
         return [*quantities, _WORST]
 
     def __call__(self, time: Fraction, values: Values, state: Sequence[arb] | None) -> None:
-        """Add one sample.  state: of :func:`state_of`."""
+        """Add one sample.  state: from :func:`state_of`."""
         if not self.truth.covers(time):
             return
         sums, self._last = self._including(time, values, state)
@@ -222,7 +221,7 @@ class ObservedErrors(Statistics):
     def _including(
         self, time: Fraction, values: Values, state: Sequence[arb] | None
     ) -> tuple[dict[Quantity, Sums], float]:
-        """The sums of every error with this sample, and an upper bound of its largest error of a column."""
+        """The sums of each error with this sample, and an upper bound of the sample's largest error of a column."""
         true = self.truth.state(time, self.bits)
         with working_precision(self.bits):
             errors = self._errors(values, true)
@@ -238,7 +237,7 @@ class ObservedErrors(Statistics):
         return self._last
 
     def _errors(self, values: Values, true: Sequence[arb]) -> dict[Quantity, arb]:
-        """Each error at one sample, at the working precision."""
+        """The errors of one sample, at the working precision."""
         axes = [[ball(entry) for entry in row] for row in self.posed.axes]
         omega, gamma = rotated(axes, true[:3]), rotated(axes, true[3:6])
         rows: Rows[arb] | None = None
@@ -262,10 +261,10 @@ class ObservedErrors(Statistics):
             return _vector_error(name, part, omega if name == "omega" else gamma)
         assert rows is not None
         if name == "omega_space":
-            return _vector_error("omega", self.said.upright(part), rotated(rows, omega))
+            return _vector_error("omega", self.convention.upright(part), rotated(rows, omega))
         if name == "position":
             return self._position(part, rows)
-        computed = self.said.upright(self.said.rotation(name, part, ball_functions()))
+        computed = self.convention.upright(self.convention.rotation(name, part, ball_functions()))
         entries = largest(a - b for u, v in zip(computed, rows, strict=True) for a, b in zip(u, v, strict=True))
         if name == "quaternion":
             entries = largest((entries, (sum((c * c for c in part), arb(0)) - 1) / 2))
@@ -276,68 +275,68 @@ class ObservedErrors(Statistics):
             Quantity(SOLUTION_ERROR, "gamma"): third,
         }
 
-    def _position(self, part: list[arb], rows: Rows[arb]) -> dict[Quantity, arb]:
-        pivot = [ball(value) for value in self.said.pivot]
-        position = self.said.upright([a - b for a, b in zip(part, pivot, strict=True)])
+    def _position(self, columns: list[arb], rows: Rows[arb]) -> dict[Quantity, arb]:
+        pivot = [ball(value) for value in self.convention.pivot]
+        position = self.convention.upright([a - b for a, b in zip(columns, pivot, strict=True)])
         true = rotated(rows, [ball(value) for value in self.point])
-        off = [a - b for a, b in zip(position, true, strict=True)]
-        length = root(dot(off, off))
+        error = [a - b for a, b in zip(position, true, strict=True)]
+        length = root(dot(error, error))
         if not self.distance_squared:
             return {Quantity(POSITION_ERROR): length, _WORST: length}
-        part_of = length / ball(self.distance_squared).sqrt()
-        return {Quantity(POSITION_ERROR): length, Quantity(POSITION_ERROR, "relative"): part_of, _WORST: part_of}
+        relative = length / ball(self.distance_squared).sqrt()
+        return {Quantity(POSITION_ERROR): length, Quantity(POSITION_ERROR, "relative"): relative, _WORST: relative}
 
     def quantities(self) -> dict[Quantity, RunningStatistics]:
-        """The errors of the columns, by what they are of."""
+        """The statistics of each error."""
         return self.running
 
     def maximum_only(self, quantity: Quantity) -> bool:
-        """Whether it is the relative error of all columns."""
+        """Whether ``quantity`` is the relative error over all columns."""
         return quantity == _WORST
 
 
 def _vector_error(name: str, vector: Sequence[arb], true: Sequence[arb]) -> dict[Quantity, arb]:
-    off = [a - b for a, b in zip(vector, true, strict=True)]
+    errors = [a - b for a, b in zip(vector, true, strict=True)]
     return {
-        Quantity(SOLUTION_ERROR, name): largest(off),
-        _WORST: relative_error(off, true),
+        Quantity(SOLUTION_ERROR, name): largest(errors),
+        _WORST: relative_error(errors, true),
     }
 
 
 def gives_state(names: Sequence[str]) -> bool:
-    """Whether these columns give Ω and γ."""
+    """Whether columns of these names determine Ω and γ."""
     attitude = any(form in names for form in FORMS)
     return ("omega" in names or ("omega_space" in names and attitude)) and ("gamma" in names or attitude)
 
 
 @whole_evaluation
-def state_of(values: Values, said: Convention, posed: Posed, bits: int) -> list[arb] | None:
-    """Ω and γ in principal axes of a sample that gives both, else None; Ω of the body's axes before that of space."""
+def state_of(values: Values, convention: Convention, posed: Posed, bits: int) -> list[arb] | None:
+    """Ω and γ of a sample in principal axes, or None; Ω in body axes takes precedence over that in space axes."""
     if not gives_state(list(values)):
         return None
     with working_precision(bits):
         columns = {name: [ball(value) for value in part] for name, part in values.items()}
         form = next((name for name in FORMS if name in columns), None)
-        rows = None if form is None else said.upright(said.rotation(form, columns[form], ball_functions()))
+        rows = None if form is None else convention.upright(convention.rotation(form, columns[form], ball_functions()))
         gamma = columns["gamma"] if "gamma" in columns else (rows or [])[2]
         if "omega" in columns:
             omega = columns["omega"]
         else:
             assert rows is not None
-            omega = list(space_to_body(rows, said.upright(columns["omega_space"])))
+            omega = list(space_to_body(rows, convention.upright(columns["omega_space"])))
         axes = [[ball(entry) for entry in row] for row in posed.axes]
         return [*space_to_body(axes, omega), *space_to_body(axes, gamma)]
 
 
 class JointViolation(Statistics):
-    """Distance of the body's fixed point from where it is held, of files that give attitude and position.
+    """Distance of the body's fixed point from the pivot, in files that give attitude and position.
 
-    Where the point whose position is given is the fixed one itself, the position alone says it.  It needs no reference.
+    The position of the fixed point itself suffices without an attitude.  No reference is needed.
     """
 
-    def __init__(self, bits: int, posed: Posed, said: Convention, keep: Sequence[Fraction]) -> None:
-        self.bits, self.said, self.keep = bits, said, frozenset(keep)
-        self.point = posed.centre if said.point is None else said.point
+    def __init__(self, bits: int, posed: Posed, convention: Convention, keep: Sequence[Fraction]) -> None:
+        self.bits, self.convention, self.keep = bits, convention, frozenset(keep)
+        self.point = posed.centre if convention.point is None else convention.point
         self.distances = RunningStatistics()
 
     def __call__(self, time: Fraction, values: Values) -> None:
@@ -349,14 +348,14 @@ class JointViolation(Statistics):
     def _including(self, values: Values) -> Sums:
         with working_precision(self.bits):
             columns = {name: [ball(value) for value in part] for name, part in values.items()}
-            position, pivot = columns["position"], [ball(value) for value in self.said.pivot]
-            off = self.said.upright([a - b for a, b in zip(position, pivot, strict=True)])
+            position, pivot = columns["position"], [ball(value) for value in self.convention.pivot]
+            offset = self.convention.upright([a - b for a, b in zip(position, pivot, strict=True)])
             if any(self.point):
                 form = next(form for form in FORMS if form in columns)
-                rows = self.said.upright(self.said.rotation(form, columns[form], ball_functions()))
+                rows = self.convention.upright(self.convention.rotation(form, columns[form], ball_functions()))
                 arm = rotated(rows, [ball(value) for value in self.point])
-                off = [a - b for a, b in zip(off, arm, strict=True)]
-            return self.distances.including([root(dot(off, off))])
+                offset = [a - b for a, b in zip(offset, arm, strict=True)]
+            return self.distances.including([root(dot(offset, offset))])
 
     def quantities(self) -> dict[Quantity, RunningStatistics]:
         """``joint_violation``."""
@@ -364,35 +363,35 @@ class JointViolation(Statistics):
 
 
 class ObservedScorer(DriftAndError):
-    """Drift where the state is whole, errors where there is a reference, the joint where position and attitude are."""
+    """Drift if the file gives the state, errors if there is a reference, joint violation from position and attitude."""
 
     def __init__(
         self,
         problem: Problem,
         truth: Truth | str,
         posed: Posed,
-        said: Convention,
+        convention: Convention,
         names: Sequence[str],
         keep: Sequence[Fraction] = (),
     ) -> None:
-        self.truth, self.said, self.posed = truth, said, posed
+        self.truth, self.convention, self.posed = truth, convention, posed
         self.bits = problem.precision.bits + GUARD_BITS
-        plain = replace(problem, xi=None)
-        self.drift = Drift(plain, problem.integrals(), keep) if gives_state(names) else None
+        without_attitude = replace(problem, xi=None)
+        self.drift = Drift(without_attitude, problem.integrals(), keep) if gives_state(names) else None
         self.error: ObservedErrors | None = None
         if not isinstance(truth, str):
-            self.error = ObservedErrors(problem, truth, posed, said, names, keep)
-        held = "position" in names and (
-            set(FORMS) & set(names) or not any(posed.centre if said.point is None else said.point)
+            self.error = ObservedErrors(problem, truth, posed, convention, names, keep)
+        shows_joint = "position" in names and (
+            set(FORMS) & set(names) or not any(posed.centre if convention.point is None else convention.point)
         )
-        self.joint = JointViolation(self.bits, posed, said, keep) if held else None
+        self.joint = JointViolation(self.bits, posed, convention, keep) if shows_joint else None
 
     def _parts(self) -> list[Statistics]:
         return [*super()._parts(), *([] if self.joint is None else [self.joint])]
 
     def __call__(self, time: Fraction, values: Values) -> None:
         """Add one sample."""
-        state = state_of(values, self.said, self.posed, self.bits)
+        state = state_of(values, self.convention, self.posed, self.bits)
         if self.drift is not None and state is not None:
             self.drift(time, state)
         if self.error is not None:
@@ -405,18 +404,18 @@ ATTITUDE, POSITION = Quantity(ATTITUDE_ERROR), Quantity(POSITION_ERROR)
 
 
 class _AttitudeErrors(ObservedErrors):
-    """Errors of the attitude and the position alone."""
+    """Errors of the attitude and of the position alone."""
 
     def quantities(self) -> dict[Quantity, RunningStatistics]:
-        """Both errors, that of the position relative too."""
+        """The attitude error, and the position error, absolute and relative."""
         return {q: running for q, running in self.running.items() if q.name in (ATTITUDE_ERROR, POSITION_ERROR)}
 
 
 class AttitudeScorer(Scorer):
-    """A scorer of states (Ω, γ, ξ): of Ω and γ as of any run, and where the true attitude is known of its angle to the
-    one computed, in radians, and of the centre of mass.
+    """A scorer of states (Ω, γ, ξ): Ω and γ as in :class:`Scorer`; where the true attitude is known, also the angle
+    between it and the computed one, in radians, and the error of the centre of mass.
 
-    problem: rounded, with ξ.  known: of Ω and γ.  top, start: exact, in principal axes.  times: exact, of the states.
+    problem: rounded, with ξ.  known: reference of Ω and γ.  top, start: exact, in principal axes.  times: exact.
     """
 
     def __init__(
@@ -432,18 +431,18 @@ class AttitudeScorer(Scorer):
         assert problem.xi is not None
         from heavytop.measure.truth import truth
 
-        turned = truth(problem, times)
+        true_attitude = truth(problem, times)
         posed = Posed(top, start, (problem.xi[0], problem.xi[1], problem.xi[2]), IDENTITY, top.centre)
         names = ("matrix", "position") if any(top.centre) else ("matrix",)
         self._attitude: _AttitudeErrors | None = None
-        if not isinstance(turned, str):
-            self._attitude = _AttitudeErrors(problem, turned, posed, Convention(), names, keep)
+        if not isinstance(true_attitude, str):
+            self._attitude = _AttitudeErrors(problem, true_attitude, posed, Convention(), names, keep)
 
     def _parts(self) -> list[Statistics]:
         return [*super()._parts(), *([] if self._attitude is None else [self._attitude])]
 
     def __call__(self, time: Fraction, state: Sequence[Any]) -> None:
-        """Take in a native state; an attitude that is not finite counts for nothing."""
+        """Add a native state; an attitude that is not finite is left out."""
         super().__call__(time, state[:6])
         if self._attitude is None:
             return

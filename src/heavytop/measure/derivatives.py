@@ -1,4 +1,4 @@
-"""Proven derivatives of a motion with respect to its start and its data, as decimal text with the radius of each."""
+"""Proven derivatives of a motion with respect to its start and its data, as decimal text with radii."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ Balls = list[list[arb]]
 
 
 class Ball(msgspec.Struct, frozen=True):
-    """A value and a radius, as decimal text: the true number is within the radius of the printed value."""
+    """Value and radius as decimal text: the true number is within the radius of the printed value."""
 
     value: str
     radius: str
 
     @classmethod
     def proven(cls, value: arb, digits: int, name: str, time: Fraction, source: str = "") -> Ball:
-        """A ball of one digit more than ``digits``: rounded to these, 1.04 may be wrong by five units of the last.
+        """A ball printed with one digit more than ``digits``, so that rounding hides none of them.
 
         Raises OutOfReach where the radius exceeds 10^-digits, relative to a value above 1.
         """
@@ -58,7 +58,7 @@ class Derivatives(msgspec.Struct, frozen=True, omit_defaults=True):
 
     start: ∂y_i(t)/∂y_j(0) as [i][j] at each time, y = (Ω1, Ω2, Ω3, γ1, γ2, γ3).  lyapunov: with them, the logarithm of
     the largest singular value of that matrix over |t|, in 1/time unit; None at t = 0.
-    data: ∂y_i(t)/∂θ_j, θ = (I1, I2, I3, n1, n2, n3), n = P r.  What was not asked for is None.
+    data: ∂y_i(t)/∂θ_j, θ = (I1, I2, I3, n1, n2, n3), n = P r.  None if not requested.
     """
 
     method: str
@@ -67,7 +67,7 @@ class Derivatives(msgspec.Struct, frozen=True, omit_defaults=True):
     lyapunov: list[Ball | None] | None = None
 
     def numpy(self) -> NDArray[numpy.float64] | dict[str, NDArray[numpy.float64]]:
-        """The values in double, shape (n, 6, 6), of the start; with data, by ``"start"`` and ``"data"``."""
+        """``start`` in double, shape (n, 6, 6); if there are data, a dict of "start" and "data"."""
         arrays = {
             name: numpy.array([[[float(ball.value) for ball in row] for row in rows] for rows in part])
             for name, part in (("start", self.start), ("data", self.data))
@@ -94,9 +94,9 @@ def known_derivatives(
 ) -> Derivatives:
     """The derivatives at ``times`` to ``digits`` digits: each within 10^-digits, relative above 1, absolute below.
 
-    body, start: a body or a top, and its state, in whose axes they are given.  which: one of :data:`WHICH`.
+    body, start: a body or a top, and its state; the derivatives are in its axes.  which: one of :data:`WHICH`.
     effort: of the enclosure.
-    Raises OutOfReach where the digits cannot be proven; InputError for a body whose principal axes are irrational.
+    Raises OutOfReach if the digits cannot be proven; InputError for a body whose principal axes are irrational.
     """
     resolved = resolve(body, start, bits_of(digits) + 256)
     if resolved.uncertainty is not None:
@@ -114,16 +114,16 @@ def known_derivatives(
         exponents = [_exponent(matrix, time, bits) for matrix, time in zip(matrices, times, strict=True)]
         lyapunov = [None if value is None else Ball(*value_text(value, digits + 1)) for value in exponents]
     if which != "start":
-        matrices = [in_axes(enclosed.data or [], resolved, kept=3) for enclosed in enclosed]
+        matrices = [in_axes(enclosed.data or [], resolved, scalars=3) for enclosed in enclosed]
         of_data = [_texts(matrix, time, digits) for matrix, time in zip(matrices, times, strict=True)]
     return Derivatives(METHOD, of_start, of_data, lyapunov)
 
 
 @whole_evaluation
-def in_axes(matrix: Balls, resolved: Resolved, kept: int = 0) -> Balls:
-    """A matrix of derivatives in principal axes, as one in the axes given: A on both sides of each 3 × 3 block.
+def in_axes(matrix: Balls, resolved: Resolved, scalars: int = 0) -> Balls:
+    """A matrix of derivatives, from principal axes to the axes given: A on both sides of each 3 × 3 block.
 
-    kept: columns that are no vectors, the principal moments.
+    scalars: leading columns that are not vector components, the principal moments.
     """
     if not resolved.is_rotated:
         return matrix
@@ -131,16 +131,16 @@ def in_axes(matrix: Balls, resolved: Resolved, kept: int = 0) -> Balls:
     with working_precision(longest + 64):
         axes = [[ball(value) for value in row] for row in resolved.axes]
 
-        def turned(vector: list[Any]) -> list[Any]:
+        def rotate(vector: list[Any]) -> list[Any]:
             return [
                 sum((a * x for a, x in zip(row, vector[begin : begin + 3], strict=True)), arb(0))
                 for begin in range(0, len(vector), 3)
                 for row in axes
             ]
 
-        columns = [turned(list(column)) for column in zip(*matrix, strict=True)]
+        columns = [rotate(list(column)) for column in zip(*matrix, strict=True)]
         rows = [list(row) for row in zip(*columns, strict=True)]
-        return [[*row[:kept], *turned(row[kept:])] for row in rows]
+        return [[*row[:scalars], *rotate(row[scalars:])] for row in rows]
 
 
 @whole_evaluation

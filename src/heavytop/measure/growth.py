@@ -1,8 +1,9 @@
-"""How an error grows with |t|: a law fitted to its root mean square over an ensemble of starts.
+"""Growth laws of errors: fits in |t| to the root mean square over an ensemble of starts.
 
-The healthy laws are Brouwer's: rounding errors that are independent from step to step make every integral walk at
-random, like √t, and the phase like t^1.5 (D. Brouwer, Astron. J. 46, 1937, 149).  A systematic error a step gives t
-and t², a wrong coefficient of the field bounded integrals and a phase like t, a chaotic motion an exponential.
+Brouwer's laws hold for a correct integrator: rounding errors that are independent from step to step make each integral
+a random walk, which grows like √t, and the phase error like t^1.5 (D. Brouwer, Astron. J. 46, 1937, 149).  A systematic
+error per step gives t and t², a wrong coefficient of the field bounded integrals and a phase error like t, chaos an
+exponential.
 """
 
 from __future__ import annotations
@@ -23,15 +24,15 @@ FEWEST_STARTS = 8
 FEWEST_DECADES = 3.0
 FEWEST_SAMPLES = 8
 NEAR = 0.12
-"""A class exponent this far outside the interval still names the law: samples see a power only up to a transient."""
+"""The class exponent may lie this far outside the interval: samples show a power only up to a transient."""
 BENT = 0.25
-"""Half the way from a class to the next: an exponent that surely changes by this within the span is not a law."""
+"""Half the distance of neighbouring classes: an exponent that significantly changes by this in the span is no law."""
 STRAIGHT = 0.1
-"""Part of the variance of log |error| that a line over |t| may leave: of a jump it leaves a quarter at least."""
+"""Largest fraction of the variance of log |error| left by a line over |t|; for a jump it is at least a quarter."""
 LOST = 0.1
-"""An error of this part of the size of a quantity leaves no digit of it."""
+"""All significant digits of a quantity are lost at an error of this fraction of its size."""
 RESOLVED = 10
-"""Times the error of the reference, below which an error is unresolved."""
+"""An error below so many times that of the reference is unresolved."""
 _DECIMALS = 6
 _RESAMPLES = 1000
 _ROUNDS = 3
@@ -40,15 +41,15 @@ _SEED = 20261121
 
 @dataclass(frozen=True, slots=True)
 class Ensemble:
-    """One quantity along many motions of one kind.
+    """The errors of one quantity along the motions of an ensemble.
 
-    times: |t| > 0, growing, shape (samples,).
+    times: |t| > 0, increasing, shape (samples,).
     errors: |error|, above 1e-300 or 0, shape (starts, samples); a start with a NaN has failed and is left out.
-    step: the mean |t| of a step.
-    size: the largest that the error can be, roughly.
+    step: the mean step size.
+    size: the order of magnitude of the largest possible error.
     resolution: the error of the reference, broadcast to the shape of ``errors``.
-    accumulates: 1 where a systematic fault of ε a step becomes size · ε · n after n steps (an integral), 2 where it
-    becomes size · ε · n²/2 (the phase, whose rate is what drifts).
+    accumulates: 1 if a systematic fault of ε per step grows to size · ε · n after n steps (an integral), 2 if it grows
+    to size · ε · n²/2 (the phase, whose rate drifts).
     """
 
     times: Array
@@ -60,21 +61,21 @@ class Ensemble:
 
     @property
     def healthy(self) -> Array:
-        """Which starts are finite at every time, shape (starts,)."""
+        """Mask of the starts that are finite at every time, shape (starts,)."""
         return numpy.asarray(numpy.isfinite(self.errors).all(axis=1))
 
     def rms(self) -> Array:
-        """Root mean square over the healthy starts, shape (samples,); NaN where it is not resolved or no start is."""
-        kept = self.errors[self.healthy]
-        if not len(kept):
+        """Root mean square over the healthy starts, shape (samples,); NaN if unresolved or without a start."""
+        healthy = self.errors[self.healthy]
+        if not len(healthy):
             return numpy.full(len(self.times), numpy.nan)
         limits = numpy.broadcast_to(self.resolution, self.errors.shape)[self.healthy]
-        rms, blur = (root_mean_square(values) for values in (kept, limits))
+        rms, blur = (root_mean_square(values) for values in (healthy, limits))
         return numpy.where(rms >= RESOLVED * blur, rms, numpy.nan)
 
 
 def root_mean_square(values: Array) -> Array:
-    """Root mean square of finite values over axis 0, which is not empty, without underflow of the squares."""
+    """Root mean square of finite values over axis 0 (not empty), without underflow of the squares."""
     largest: Array = numpy.abs(values).max(axis=0)
     scaled = numpy.divide(values, largest, out=numpy.zeros_like(values, dtype=float), where=largest > 0)
     root: Array = largest * numpy.sqrt((scaled**2).mean(axis=0))
@@ -83,7 +84,7 @@ def root_mean_square(values: Array) -> Array:
 
 @cache
 def resampled(starts: int) -> Array:
-    """Weights of the bootstrap, shape (resamples, starts); each row sums to 1.  The same for the same ``starts``."""
+    """Weights of the bootstrap, shape (resamples, starts); each row sums to 1.  Deterministic."""
     draws = numpy.random.default_rng(_SEED).multinomial(starts, numpy.full(starts, 1 / starts), _RESAMPLES)
     weights: Array = draws / starts
     return weights
@@ -104,8 +105,8 @@ def band(values: Array) -> float | None:
 def _interval(estimates: Array, starts: int) -> Interval:
     """The 95 % percentile interval, expanded for few starts (T. Hesterberg, Am. Stat. 69, 2015, 371).
 
-    By √(n/(n − 1)), for resamples scatter about the sample and not the truth, and by the ratio of the 97.5 % points of
-    Student's t and the normal distribution, 1 + (z² + 1)/(4 (n − 1)) with z = 1.96.
+    The factors are √(n/(n − 1)), for resamples scatter about the sample mean and not the true one, and the ratio of the
+    97.5 % points of Student's t and the normal distribution, 1 + (z² + 1)/(4 (n − 1)) with z = 1.96.
     """
     low, middle, high = numpy.percentile(estimates, [2.5, 50, 97.5])
     wider = (starts / (starts - 1)) ** 0.5 * (1 + 1.21 / (starts - 1))
@@ -115,29 +116,29 @@ def _interval(estimates: Array, starts: int) -> Interval:
 def law(ensemble: Ensemble) -> Law:
     """The law of growth, with its interval over starts.
 
-    Only samples with a resolved RMS before the error of any start is a tenth of the size of the quantity are used.
+    Only samples are used whose RMS is resolved, before the error of any start reaches a tenth of the size of the
+    quantity.
 
-    A power is a least-squares line through log RMS over log |t|, over the last three decades of these: earlier the law
-    that wins in the end may hide behind another.  Each start counts by its share of the RMS relative to its own mean
-    share, so that the few starts with the largest errors do not make the exponent alone.  Its class is the nearest,
-    and must be in the interval (to ±0.12) with its neighbours out of it; and the exponents of its two halves
-    must not surely differ by more than a quarter (bend), as they do where one law takes over from another.  Where the
-    exponent of the whole surely differs by as much from the mean of those of its halves, the error jumps, and has none.
+    A power is a least-squares line through log RMS over log |t|, over the last three decades: earlier another law may
+    dominate.  Each start is weighted by its share of the RMS relative to its own mean share, so that a few starts with
+    large errors do not determine the exponent.  The class is the nearest one; it must be in the interval (to ±0.12),
+    and its neighbours outside.  The exponents of the two halves of the span must not significantly differ by more than
+    a quarter (bend), as they do at a transition between laws.  If the exponent of the span significantly differs by as
+    much from the mean of those of its halves, the error jumps, and there is no law.
 
-    An exponential needs three decades of error, a power fit of log RMS steeper than t², and a line over |t|, each
-    sample counting as much as the time it stands for, that fits better than the power in 95 % of the resamples, and
-    leaves less than a tenth of the variance, as of a jump it does not.  Its number is the median over the starts of
-    their finite-time rates, each the slope of log |error| over |t| within the fitted span; its interval is that of the
-    median of such rates (:func:`median_interval`).  The few starts with the largest rates, which lead the RMS in the
-    end, do not make it.
+    An exponential needs three decades of error, a power fit of log RMS steeper than t², and a line over |t| (samples
+    weighted by their spacing) that fits better than the power in 95 % of the resamples and leaves less than a tenth of
+    the variance, which excludes jumps.  Its rate is the median over the starts of their finite-time rates, each the
+    slope of log |error| over |t| within the fitted span; its interval is that of this median (:func:`median_interval`).
+    The few starts with the largest rates, which dominate the RMS at late times, do not determine it.
 
-    Anything else is unresolved, with the exponent and interval of the power fit where there are three decades for one,
-    so that it can be compared.  An error that is exactly 0 throughout is bounded, without an exponent.
+    Anything else is unresolved; if the span has three decades, the exponent and interval of the power fit are reported
+    for comparison.  An error that is exactly 0 throughout is bounded, without an exponent.
 
-    detects: the smallest ε, a systematic relative fault a step, that would have been told: its n-th sum f lifts the
-    RMS r at the last fitted time to √(r² + f²), and the lower end of that ensemble's 95 % interval, about
-    √(r_low² + f²), must be above the upper end r_high of the healthy one: f = √(r_high² − r_low²), with
-    f = size ε n for an integral and size ε n²/2 for the phase.
+    detects: the smallest detectable relative bias ε per step.  Its sum f over n steps raises the RMS r at the last
+    fitted time to √(r² + f²).  The lower end of that ensemble's 95 % interval, about √(r_low² + f²), must be above the
+    upper end
+    r_high of the healthy one: f = √(r_high² − r_low²), with f = size ε n for an integral and size ε n²/2 for the phase.
     """
     starts = int(ensemble.healthy.sum())
     unresolved = Law("unresolved", starts)
@@ -156,8 +157,8 @@ def law(ensemble: Ensemble) -> Law:
         return unresolved
     growth, first, slope, (low, high), bend = fit
     logs = numpy.log(rms[-1]) + numpy.log(resampled(starts) @ shares[:, -1]) / 2
-    least, most = numpy.exp(_interval(logs, starts))
-    lift, n, order = (most**2 - least**2) ** 0.5, times[-1] / ensemble.step, ensemble.accumulates
+    lower, upper = numpy.exp(_interval(logs, starts))
+    bias, n, order = (upper**2 - lower**2) ** 0.5, times[-1] / ensemble.step, ensemble.accumulates
     return Law(
         growth,
         starts,
@@ -166,7 +167,7 @@ def law(ensemble: Ensemble) -> Law:
         high,
         first=f"{first:.6g}",
         last=f"{times[-1]:.6g}",
-        detects=None if growth == "exponential" else f"{lift * order / n**order / ensemble.size:.3g}",
+        detects=None if growth == "exponential" else f"{bias * order / n**order / ensemble.size:.3g}",
         lost_at=_lost(ensemble, growth, times, rms),
         bend=bend,
     )
@@ -184,44 +185,44 @@ def _fit(x: Array, y: Array, weights: Array | None = None) -> tuple[Array, Array
     """Slopes and sums of squared residuals of least-squares lines through (x, y), y of shape (..., samples)."""
     w = numpy.ones_like(x) if weights is None else weights
     centred = x - numpy.average(x, weights=w)
-    rest = y - numpy.average(y, axis=-1, weights=w)[..., numpy.newaxis]
-    slopes = rest @ (w * centred) / (w @ centred**2)
-    return slopes, (rest - slopes[..., numpy.newaxis] * centred) ** 2 @ w
+    deviations = y - numpy.average(y, axis=-1, weights=w)[..., numpy.newaxis]
+    slopes = deviations @ (w * centred) / (w @ centred**2)
+    return slopes, (deviations - slopes[..., numpy.newaxis] * centred) ** 2 @ w
 
 
-_Found = tuple[Growth, float, float, Interval, Interval | None]
-"""The class, the first fitted time, the exponent or rate, its interval; of a power that of its bend."""
+_Fit = tuple[Growth, float, float, Interval, Interval | None]
+"""Class, first fitted time, exponent or rate, its interval, and for a power the interval of its bend."""
 
 
-def _power(times: Array, rms: Array, shares: Array) -> _Found | None:
+def _power(times: Array, rms: Array, shares: Array) -> _Fit | None:
     # times are rounded to a few digits
     late = times >= times[-1] / 10**FEWEST_DECADES * 0.999
     x, y, shares = numpy.log(times[late]), numpy.log(rms[late]), shares[:, late]
     if times[late][-1] < times[late][0] * 10**FEWEST_DECADES * 0.9 or len(x) < FEWEST_SAMPLES:
         return None
     starts, half = len(shares), len(x) // 2
-    slopes, squares = _fit(x, y + _levelled(shares, numpy.full((1, starts), 1 / starts)))
+    slopes, squares = _fit(x, y + _balanced(shares, numpy.full((1, starts), 1 / starts)))
     slope, scatter = float(slopes[0]), float(squares[0] / (len(x) - 2) / ((x - x.mean()) ** 2).sum()) ** 0.5
-    logs = y + _levelled(shares, resampled(starts))
-    whole, first, second = (_fit(x[part], logs[:, part])[0] for part in (slice(None), slice(half), slice(half, None)))
-    # where the error jumps, the halves do not have the slope of the whole
-    if bent(_interval(whole - (first + second) / 2, starts)):
+    logs = y + _balanced(shares, resampled(starts))
+    overall, first, second = (_fit(x[part], logs[:, part])[0] for part in (slice(None), slice(half), slice(half, None)))
+    # if the error jumps, the slope of the span is not the mean of those of its halves
+    if bent(_interval(overall - (first + second) / 2, starts)):
         return None
     begin, end = _interval(second - first, starts)
-    low, high = _widened(slope, _interval(whole, starts), scatter)
-    # the class is that of the numbers as they are written
+    low, high = _widened(slope, _interval(overall, starts), scatter)
+    # the class follows from the rounded numbers, as they are printed
     slope, low, high, begin, end = (round(value, _DECIMALS) for value in (slope, low, high, begin, end))
     growth = "unresolved" if bent((begin, end)) else nearest_class(slope, low, high)
     return growth, times[late][0], slope, (low, high), (begin, end)
 
 
 def bent(bend: Interval) -> bool:
-    """Whether the exponents of the two halves surely differ by more than a law may bend."""
+    """Whether the exponents of the two halves significantly differ by more than :data:`BENT`."""
     return bend[0] > BENT or bend[1] < -BENT
 
 
 def nearest_class(exponent: float, low: float, high: float) -> Growth:
-    """The class nearest to an exponent, if it alone is in the interval ``low`` to ``high``; else unresolved."""
+    """The class nearest to an exponent if it is the only one in the interval ``low`` to ``high``, else unresolved."""
     growth = min(CLASSES, key=lambda name: abs(CLASSES[name] - exponent))
     others = (value for name, value in CLASSES.items() if name != growth)
     alone = low - NEAR <= CLASSES[growth] <= high + NEAR and not any(low <= value <= high for value in others)
@@ -229,40 +230,40 @@ def nearest_class(exponent: float, low: float, high: float) -> Growth:
 
 
 def _widened(slope: float, interval: Interval, scatter: float) -> Interval:
-    """The interval of an exponent, such that 95 % hold the truth for every law.
+    """The interval of an exponent, widened to a coverage of 95 % for every law.
 
-    The bootstrap alone knows nothing of what all starts share: an error that oscillates is seen at a few phases, the
-    same in each, which bends the line by its own standard error, ``scatter`` (`validation/law_coverage.py` counts).
+    The bootstrap does not see errors common to all starts: an oscillation is sampled at the same few phases in each,
+    which changes the slope by the standard error of the fit, ``scatter`` (`validation/law_coverage.py` counts).
     """
     low, high = (math.hypot(max(part, 0.0), 2 * scatter) for part in (slope - interval[0], interval[1] - slope))
     return slope - low, slope + high
 
 
-def _levelled(shares: Array, weights: Array) -> Array:
+def _balanced(shares: Array, weights: Array) -> Array:
     """Half the log of the mean share with each start scaled to its own mean, shape (resamples, samples).
 
-    weights: of the starts, shape (resamples, starts); the shares that the own means refer to are the resample's.
+    weights: of the starts, shape (resamples, starts); each mean refers to the shares of its resample.
     """
     mean = weights @ shares
-    # a start's own mean is taken relative to all: again with the scaled ones, until large ones do not lead
+    # the mean of a start is relative to all: iterated with scaled starts, until large ones do not dominate
     for _ in range(_ROUNDS):
-        own = (1 / mean) @ shares.T
-        mean = numpy.divide(weights, own, out=numpy.zeros_like(own), where=own > 0) @ shares
-    levelled: Array = numpy.log(mean) / 2
-    return levelled
+        means = (1 / mean) @ shares.T
+        mean = numpy.divide(weights, means, out=numpy.zeros_like(means), where=means > 0) @ shares
+    logs: Array = numpy.log(mean) / 2
+    return logs
 
 
-def _exponential(times: Array, rms: Array, shares: Array) -> _Found | None:
+def _exponential(times: Array, rms: Array, shares: Array) -> _Fit | None:
     if rms[-1] < rms[0] * 10**FEWEST_DECADES:
         return None
     weights, starts = numpy.gradient(times), len(shares)
     drawn = resampled(starts) @ shares
-    # of a few starts some may be exactly 0 together
+    # a resample of few starts may be exactly 0
     logs = numpy.log(rms) + numpy.log(drawn[(drawn > 0).all(axis=1)]) / 2
-    powers, off_power = _fit(numpy.log(times), logs, weights)
-    _, off_exponential = _fit(times, logs, weights)
+    powers, power_residuals = _fit(numpy.log(times), logs, weights)
+    _, exponential_residuals = _fit(times, logs, weights)
     centred = logs - numpy.average(logs, axis=-1, weights=weights)[:, numpy.newaxis]
-    better = (off_exponential < off_power) & (off_exponential < STRAIGHT * (centred**2 @ weights))
+    better = (exponential_residuals < power_residuals) & (exponential_residuals < STRAIGHT * (centred**2 @ weights))
     if _interval(powers, starts)[0] <= CLASSES["t^2"] or better.mean() < 0.95:
         return None
     rates = finite_time_rates(times, numpy.sqrt(shares) * rms)
@@ -271,9 +272,9 @@ def _exponential(times: Array, rms: Array, shares: Array) -> _Found | None:
 
 
 def finite_time_rates(times: Array, errors: Array) -> Array:
-    """The rate of each start, shape (starts,): the slope of log |error| over |t|, each sample weighing its time.
+    """The rate of each start, shape (starts,): the slope of log |error| over |t|, samples weighted by their spacing.
 
-    Samples where the error is exactly 0 count for nothing; a start with fewer than two others has the rate 0.
+    Samples with an error of exactly 0 have no weight; a start with fewer than two others has the rate 0.
     """
     weights = numpy.where(errors > 0, numpy.gradient(times), 0.0)
     logs = numpy.log(numpy.where(errors > 0, errors, 1.0))
@@ -286,7 +287,7 @@ def finite_time_rates(times: Array, errors: Array) -> Array:
 
 
 def median_interval(values: Array) -> Interval:
-    """The narrowest pair of order statistics, equally far from both ends, that holds the median in 95 % or more.
+    """The narrowest symmetric pair of order statistics that encloses the median with a probability of at least 95 %.
 
     Each value is above the median of its distribution with probability 1/2, whatever the distribution is: so the
     number of those below is binomial, and the interval is exact for any number of starts, where a percentile bootstrap
@@ -303,17 +304,17 @@ def median_interval(values: Array) -> Interval:
 
 
 def _lost(ensemble: Ensemble, growth: Growth, times: Array, rms: Array) -> str | None:
-    """When the RMS is a tenth of the size: the first sample where it is, else by the class, if that says when."""
+    """When the RMS reaches a tenth of the size: the first such sample, else extrapolated by the law."""
     beyond = numpy.flatnonzero(ensemble.rms() >= LOST * ensemble.size)
     if len(beyond):
         return f"{ensemble.times[beyond[0]]:.3g}"
     if growth in ("bounded", "unresolved"):
         return None
-    # the last quarter of the samples: there the law is nearest
+    # the last quarter of the samples follows the law best
     late = slice(-(len(times) // 4), None)
     missing = numpy.log(LOST * ensemble.size) - numpy.log(rms[late]).mean()
     if growth == "exponential":
-        # the root mean square goes with the fastest starts, and faster than the median of the rates
+        # the root mean square grows with the fastest starts, faster than the median of the rates
         rate = float(_fit(times, numpy.log(rms), numpy.gradient(times))[0])
         return f"{times[late].mean() + missing / rate:.3g}"
     return f"{numpy.exp(numpy.log(times[late]).mean() + missing / CLASSES[growth]):.3g}"

@@ -1,4 +1,4 @@
-"""An integrator as the measurements call it: by its name, one motion or many, whatever it offers."""
+"""Timed runs of integrators, checks of their seconds and counts, and ensembles with their growth laws."""
 
 from __future__ import annotations
 
@@ -30,43 +30,42 @@ from heavytop.precision import Array, decimal_text, exact
 from heavytop.records import UNRESOLVED_SECONDS, Law, Metric, Quantity, Series
 from heavytop.top.heavy_top import State
 
-# The seconds that an integrator takes, and whether what one of another package says of its runs can be.
+# Seconds of an integrator, and plausibility of what a third-party integrator reports.
 #
-# One of another package is believed nothing that can be measured.  It is timed by the clock here, in calls from starts
-# that lie units in the last place apart, so that no call repeats an earlier one; each of them must end where the run
-# ends whose error is measured.
+# Nothing that can be measured is taken from a third-party integrator.  Its calls are timed here, from starts that lie
+# units in the last place apart, so that no call repeats an earlier one; each must end where the run ends whose error is
+# measured.
 
 
-_REST = 0.002
-"""Seconds of sleep before a run: it then starts on a fresh slice of the processor's time."""
+_PAUSE = 0.002
+"""Seconds of sleep before a run, which then starts with a new time slice of the processor."""
 TOO_LONG = 3.0
-"""A run of so many seconds is timed once."""
-_FURTHER = 10
-"""Times the error of a run and what a change of its start in the last places makes, which the end of another may be
-off."""
-_KEPT = 5.0
-"""Times as fast: calls that are so much quicker than those from starts further away were not computed."""
-_LOOKS = 12
-"""Calls from further away, of which every one must be slow."""
+"""A run that takes so many seconds is timed once."""
+_MARGIN = 10
+"""Two ends may differ by so many times the error of a run plus the effect of the last places of its start."""
+_FASTER = 5.0
+"""Calls that are so many times as fast as those from distant starts were not computed."""
+_DISTANT_CALLS = 12
+"""Calls from distant starts, each of which must be slow."""
 _ENOUGH_AS_QUICK = 3
-"""So many of them are as quick as an equal call made then: on a busy machine both wait for the processor."""
-_AFAR = 512
-"""A start is far from those of the other calls that is off by this part of itself."""
-_KEPT_SECONDS = 1e-3
-"""Shorter calls are not looked at for that: a pause of the machine is as long."""
+"""So many of these as quick as a repeated call acquit: on a busy machine both wait for the processor."""
+_DISTANT = 512
+"""Distant starts differ from those of the other calls by multiples of 1/512 of themselves."""
+_CHECKED_SECONDS = 1e-3
+"""Shorter calls are not checked: a pause of the machine is as long."""
 _ANGLE_OF_ORDER = 4
-"""Radians of a step by which a method of order p hardly errs by less than its size: as many times p + 1, generously.
-The remainder of the exponential's series of order p is (θ e/(p + 1))^(p + 1) about."""
+"""A method of order p loses all digits in steps of about so many times p + 1 radians, a generous bound.
+The remainder of the exponential's series of order p is about (θ e/(p + 1))^(p + 1)."""
 
 Integrate = Callable[..., Trajectory]
-"""(times, start): a run over the times, from another start where one is given."""
+"""(times, start): a run over the times; the start may be left out for that of the problem."""
 Figures = dict[str, float]
 
 
 class Repeats(NamedTuple):
-    """How often a run is timed: ``least`` times, or up to ``most`` until ``enough`` seconds have gone.
+    """Number of timed runs: ``least``, or up to ``most`` until ``enough`` seconds have passed.
 
-    slow: of a run that takes long.  band: whether the scatter of the runs is measured.
+    slow: the number of a slow run.  band: whether the scatter of the runs is measured.
     """
 
     least: int
@@ -77,9 +76,9 @@ class Repeats(NamedTuple):
 
 
 def timed(run: Callable[[int], Trajectory], how: Repeats) -> tuple[Figures, list[Trajectory]]:
-    """Median seconds of several runs, and the runs; ``run`` is given their numbers, from 1 on.
+    """Median seconds of several runs, and the runs; ``run`` is called with 1, 2, ...
 
-    The band is half of the interval in decades that holds the middle 95 % of the runs.
+    The band is half of the central 95 % interval of the runs, in decades.
     """
     began, runs = perf_counter(), [run(1)]
     least, most = (how.least, how.most) if runs[0].seconds["run"] < TOO_LONG else (how.slow, how.slow)
@@ -88,13 +87,13 @@ def timed(run: Callable[[int], Trajectory], how: Repeats) -> tuple[Figures, list
         and len(runs) < most
         and (len(runs) < least or perf_counter() - began < how.enough)
     ):
-        sleep(_REST)
+        sleep(_PAUSE)
         runs.append(run(len(runs) + 1))
-    spent = [run.seconds["run"] for run in runs]
-    figures = {"run": median(spent), "least": min(spent), "repeats": float(len(spent))}
+    seconds = [run.seconds["run"] for run in runs]
+    figures = {"run": median(seconds), "least": min(seconds), "repeats": float(len(seconds))}
     figures |= next(({key: run.seconds[key]} for run in runs if (key := UNRESOLVED_SECONDS) in run.seconds), {})
-    if how.band and len(spent) > 1 and min(spent) > 0:
-        low, high = numpy.quantile(numpy.log10(spent), [0.025, 0.975])
+    if how.band and len(seconds) > 1 and min(seconds) > 0:
+        low, high = numpy.quantile(numpy.log10(seconds), [0.025, 0.975])
         figures["band"] = round(float(high - low) / 2, 4)
     return figures, runs
 
@@ -107,11 +106,11 @@ def tried(
     error: Fraction | None,
     how: Repeats,
 ) -> tuple[Figures, Trajectory]:
-    """Seconds of runs to the end alone of an integrator of another package, and such a run from the start itself.
+    """Seconds of a third-party integrator to the last time alone, and such a run from the start itself.
 
-    judged: the run over all times whose ``error`` was measured, None where it is not known.  how: as in :func:`timed`.
-    Raises PeerFailed where equal calls differ, where calls are answered from memory, and where a run that is timed ends
-    elsewhere than the one that is judged.
+    judged: the run over all times.  error: of ``judged``, None if unknown.  how: as in :func:`timed`.
+    Raises PeerFailed if equal calls differ, if results are kept between calls, and if a timed run ends elsewhere than
+    ``judged``.
     """
     times = judged.times
     again = integrate(times)
@@ -119,7 +118,7 @@ def tried(
     alone = integrate(times[-1:])
     how = how._replace(least=max(how.least, 2), most=max(how.most, 2))
     figures, runs = timed(lambda j: integrate(times[-1:], _nudged(problem, j)), how)
-    most = _allowed(problem, judged, len(runs), error)
+    most = _tolerated(problem, judged, len(runs), error)
     for run, what in [
         (alone, "asked for its last time alone"),
         *((run, "from a start units in the last place away") for run in runs),
@@ -132,20 +131,20 @@ def tried(
 
 
 def _nudged(problem: Problem, count: int) -> State:
-    """A start ``count`` units in the last place away, for which no run has been kept."""
+    """A start ``count`` units in the last place away, from which no result can have been kept."""
     return _moved(problem, count * problem.precision.eps)
 
 
 def _moved(problem: Problem, part: Fraction) -> State:
-    """A start with Ω larger by a part of it, or γ where Ω is 0: where γ is parallel to M, it stays so."""
+    """A start with Ω scaled by 1 + ``part``, or γ if Ω is 0; if γ is parallel to M, it stays so."""
     start = problem.start if problem.given is None else problem.given[1]
     if not any(start.omega):
         return State(start.omega, [(1 + part) * value for value in start.gamma])
     return State([(1 + part) * value for value in start.omega], start.gamma)
 
 
-def _allowed(problem: Problem, judged: Trajectory, count: int, error: Fraction | None) -> Fraction | None:
-    """How far the last states of two runs may be apart, largest component; None where heyoka does not get there."""
+def _tolerated(problem: Problem, judged: Trajectory, count: int, error: Fraction | None) -> Fraction | None:
+    """The largest allowed distance of the last states of two runs; None if heyoka does not reach the end."""
     top, start = problem.given or (problem.top, problem.start)
     try:
         ends = [
@@ -156,13 +155,13 @@ def _allowed(problem: Problem, judged: Trajectory, count: int, error: Fraction |
         return None
     if any(run.outcome is not Outcome.SUCCESS for run in ends):
         return None
-    known = _distance(judged, ends[0]) if error is None else error
-    return _FURTHER * (known + _distance(*ends) + problem.precision.eps)
+    error_of_run = _distance(judged, ends[0]) if error is None else error
+    return _MARGIN * (error_of_run + _distance(*ends) + problem.precision.eps)
 
 
-def _distance(one: Trajectory, other: Trajectory) -> Fraction:
-    """The distance of the last states, largest component."""
-    return max(abs(exact(a) - exact(b)) for a, b in zip(one.states[-1], other.states[-1], strict=True))
+def _distance(first: Trajectory, second: Trajectory) -> Fraction:
+    """The maximum norm of the difference of the last states."""
+    return max(abs(exact(a) - exact(b)) for a, b in zip(first.states[-1], second.states[-1], strict=True))
 
 
 def _require_near(name: str, run: Trajectory, judged: Trajectory, most: Fraction | None, what: str, count: int) -> None:
@@ -176,7 +175,7 @@ def _require_near(name: str, run: Trajectory, judged: Trajectory, most: Fraction
 
 
 def _require_computed(name: str, integrate: Integrate, problem: Problem, runs: Sequence[Trajectory]) -> None:
-    """Raises PeerFailed where a call is answered otherwise when it is made again, or much sooner than from afar."""
+    """Raise PeerFailed if a repeated call differs, or is much faster than one from a distant start."""
     times = runs[0].times
     equal = [integrate(times, _nudged(problem, 1)) for _ in range(2)]
     for run in equal:
@@ -184,13 +183,14 @@ def _require_computed(name: str, integrate: Integrate, problem: Problem, runs: S
     groups = (equal, "it was asked again"), (runs[1:], "it was asked from starts next to one that it knew")
     quick, what = min((max(run.seconds["run"] for run in group), what) for group, what in groups)
     afar, as_quick = math.inf, 0
-    for step in range(1, _LOOKS + 1):  # a busy machine slows a call or two, not every one
+    for step in range(1, _DISTANT_CALLS + 1):  # a busy machine slows a call or two, not every one
         known, unknown = (
-            _rested(integrate, times, start) for start in (_nudged(problem, 1), _moved(problem, Fraction(step, _AFAR)))
+            _after_pause(integrate, times, start)
+            for start in (_nudged(problem, 1), _moved(problem, Fraction(step, _DISTANT)))
         )
         afar = min(afar, unknown)
-        as_quick += unknown <= _KEPT * known
-        if afar <= max(_KEPT_SECONDS, quick * _KEPT) or as_quick == _ENOUGH_AS_QUICK:
+        as_quick += unknown <= _FASTER * known
+        if afar <= max(_CHECKED_SECONDS, quick * _FASTER) or as_quick == _ENOUGH_AS_QUICK:
             return
     raise PeerFailed(
         f"{name} took {afar:.2g} s or more from starts that it did not know, and {quick:.2g} s or less when {what}: "
@@ -198,16 +198,16 @@ def _require_computed(name: str, integrate: Integrate, problem: Problem, runs: S
     )
 
 
-def _rested(integrate: Integrate, times: Sequence[Fraction], start: State) -> float:
-    """Seconds of a call behind a rest, after which a program has to be woken."""
-    sleep(_REST)
+def _after_pause(integrate: Integrate, times: Sequence[Fraction], start: State) -> float:
+    """Seconds of a call after a pause, in which an idle program falls asleep."""
+    sleep(_PAUSE)
     return float(integrate(times, start).seconds["run"])
 
 
 def require_counts(name: str, run: Trajectory, control: tuple[str, Fraction] | None) -> None:
-    """Raises PeerFailed where a run to its end cannot have taken as few steps as it says.
+    """Raise PeerFailed if a run to its end cannot have taken as few steps as it reports.
 
-    A motion takes a step at least, and steps are no fewer than half of those that a step size asks for.
+    A motion takes at least one step, and with a step size at least half of the steps that the size implies.
     """
     if NOT_COUNTED.items() <= run.flags.items():
         return
@@ -223,10 +223,10 @@ def require_counts(name: str, run: Trajectory, control: tuple[str, Fraction] | N
 
 
 def doubtful_counts(run: Trajectory, error: Fraction | None) -> str:
-    """In a sentence, that its steps do not explain how small the ``error`` of a run is; "" where they do.
+    """A sentence if the counts of a run do not explain how small its ``error`` is, else "".
 
-    One step of a method of order p is off by (θ/(4 (p + 1)))^(p + 1) of the state about, where the motion turns by θ in
-    it.  That refutes no count: there are motions on which a method is exact, and steps that do not evaluate the field.
+    A step of a method of order p through an angle θ has a relative error of about (θ/(4 (p + 1)))^(p + 1).  This does
+    not refute a count: a method may be exact on a motion, and a step may need no evaluation of the field.
     """
     if NOT_COUNTED.items() <= run.flags.items() or not run.steps:
         return ""
@@ -236,20 +236,20 @@ def doubtful_counts(run: Trajectory, error: Fraction | None) -> str:
         return ""
     states = numpy.array([[float(exact(value)) for value in state] for state in (run.problem.start.flat, *run.states)])
     angle = _rate(run.problem, states) * float(abs(run.times[-1])) / run.steps
-    least = min(1.0, angle / (_ANGLE_OF_ORDER * (run.order + 1))) ** (run.order + 1) * numpy.abs(states).max()
-    if error >= exact(float(least)):
+    bound = min(1.0, angle / (_ANGLE_OF_ORDER * (run.order + 1))) ** (run.order + 1) * numpy.abs(states).max()
+    if error >= exact(float(bound)):
         return ""
     return (
-        f"It counts {run.steps} steps of {angle:.2g} rad: of order {run.order} they would be off by {least:.1g}, and "
+        f"It counts {run.steps} steps of {angle:.2g} rad: of order {run.order} they would be off by {bound:.1g}, and "
         f"it is off by {decimal_text(error, 2)}: it is exact on this motion, or takes more steps than it counts."
     )
 
 
 def _rate(problem: Problem, states: Any) -> float:
-    """The angular rate of the motion: the median over states of |y'|/|y| of Ω or of γ, whichever is faster."""
+    """The angular rate of the motion: the median over states of |y'|/|y|, the larger one of Ω and γ."""
     p = problem.parameters
-    plain = p.mapped(float)
-    rates = numpy.array([problem.system.field(plain, state) for state in states], dtype=float)
+    parameters = p.mapped(float)
+    rates = numpy.array([problem.system.field(parameters, state) for state in states], dtype=float)
     parts = [
         (numpy.linalg.norm(rates[:, i : i + 3], axis=1), numpy.linalg.norm(states[:, i : i + 3], axis=1))
         for i in (0, 3)
@@ -257,19 +257,19 @@ def _rate(problem: Problem, states: Any) -> float:
     return max(float(numpy.median(numpy.divide(a, b, out=numpy.zeros_like(a), where=b > 0))) for a, b in parts)
 
 
-# An ensemble of motions: each scored as it goes by, then how their errors grow, and by what law.
+# Ensembles: each motion is scored while it is computed, then growth laws are fitted to their errors.
 
 
 _DIGITS = 6
 _ACCUMULATES = {"along": 2, "across": 1, "omega": 2, "gamma": 2}
-"""For each error: 1 where a fault a step adds up like n, 2 where it adds up like n²."""
+"""By error: 1 if a fault per step accumulates like n, 2 if like n²."""
 
 
 class Ended(msgspec.Struct, frozen=True):
-    """The record of one start whose motion has ended.
+    """The record of a finished motion of an ensemble.
 
-    values: by the key of each quantity, at the samples that it reached, as far as there is a truth; None where that is
-    not finite.  The rest as in :class:`heavytop.integrate.trajectory.Trajectory`.
+    values: by the key of each quantity, at the samples that it reached and the reference covers; None for a value that
+    is not finite.  Other fields as in :class:`heavytop.integrate.trajectory.Trajectory`.
     """
 
     integrator: str
@@ -283,13 +283,13 @@ class Ended(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, run: Trajectory, scorer: Scorer) -> Ended:
-        """The record of a run that went to ``scorer``."""
+        """The record of a run whose states ``scorer`` has measured."""
         running = scorer.running()
-        values = {q.text: [_finite(kept) for kept in run.kept.values()] for q, run in running.items()}
-        lost = run.outcome is Outcome.SUCCESS and any(None in kept for kept in values.values())
+        values = {q.text: [_finite(value) for value in run.kept.values()] for q, run in running.items()}
+        non_finite = run.outcome is Outcome.SUCCESS and any(None in part for part in values.values())
         return cls(
             run.integrator,
-            (Outcome.NON_FINITE if lost else run.outcome).value,
+            (Outcome.NON_FINITE if non_finite else run.outcome).value,
             str(run.time_reached),
             run.steps,
             run.order,
@@ -313,7 +313,7 @@ def complete(
     integrator: Integrator,
     options: Mapping[str, Any],
 ) -> None:
-    """Compute those of the motions that are missing, all side by side; save after each.  options: the integrator's."""
+    """Compute the missing motions as an ensemble; save after each.  options: of the integrator."""
     missing = [index for index in range(len(problems)) if index not in motions]
 
     def observe(index: int, time: Fraction, state: Any) -> None:
@@ -330,7 +330,7 @@ def complete(
 
 @dataclass(slots=True)
 class Growing:
-    """The results of an ensemble: metrics, each a root mean square over the starts, series and their laws."""
+    """The results of an ensemble: metrics and series, root mean squares over the starts, and growth laws."""
 
     metrics: dict[Quantity, Metric]
     series: dict[str, Series]
@@ -346,16 +346,16 @@ def growing(
     time_text: TimeText,
     distance: float = 0.0,
 ) -> Growing:
-    """How every drift grows, and every error where there is a reference.
+    """The growth of each drift, and of each error if there is a reference.
 
-    times: exact, shape (samples,), as they are asked for.  distance: of the centre of mass from the fixed point.
+    times: exact, shape (samples,), as requested.  distance: of the centre of mass from the fixed point.
     """
     steps = sum(motion.steps for motion in motions) / len(motions)
     step = float(times[-1]) / steps if steps else 0.0
     results, moments = Growing({}, {}, {}), numpy.array([float(abs(time)) for time in times])
 
     def add(quantity: Quantity, sizes: Array, samples: int, accumulates: int, blur: Array | float = 0.0) -> None:
-        """Take in a quantity.  sizes: of it in each motion, shape (starts,)."""
+        """Add the results of a quantity.  sizes: its size in each motion, shape (starts,)."""
         values = _values(quantity, samples, motions)
         ensemble = Ensemble(moments[:samples], values, step, resolution=blur, accumulates=accumulates)
         if ensemble.healthy.any():
@@ -370,7 +370,7 @@ def growing(
         for quantity, sizes, accumulates in _errors(starts, motions, distance):
             add(quantity, sizes, reference.samples, accumulates, blur)
         values = _values(RELATIVE.over(""), reference.samples, motions)
-        # over the starts that reached the end, of the largest of their values
+        # RMS over the starts that reached the end, of the maximum of each
         results.metrics[RELATIVE] = _metric(values[numpy.isfinite(values).all(axis=1)].max(axis=1), True)
     return results
 
@@ -378,22 +378,22 @@ def growing(
 def _errors(
     starts: Sequence[State], motions: Sequence[Ended], distance: float
 ) -> Iterator[tuple[Quantity, Array, int]]:
-    """The error of Ω and γ, of its parts, and of attitude and position where every motion has them: size in each
-    motion, and how it accumulates.
+    """(quantity, size in each motion, accumulation) of the errors of Ω, γ and the state, and of attitude and position
+    if every motion has them.
     """
     omega = numpy.linalg.norm([[float(w) for w in start.omega] for start in starts], axis=1)
-    one = numpy.ones(len(starts))
-    state_sizes = numpy.hypot(omega, one)
-    sizes = {"along": state_sizes, "across": state_sizes, "omega": omega, "gamma": one}
+    ones = numpy.ones(len(starts))
+    state_sizes = numpy.hypot(omega, ones)
+    sizes = {"along": state_sizes, "across": state_sizes, "omega": omega, "gamma": ones}
     for part, accumulates in _ACCUMULATES.items():
         yield Quantity(SOLUTION_ERROR, part), sizes[part], accumulates
-    for quantity, size in ((ATTITUDE, one), (POSITION, distance * one)):
+    for quantity, size in ((ATTITUDE, ones), (POSITION, distance * ones)):
         if all(quantity.text in motion.values for motion in motions):
             yield quantity, size, 2
 
 
 def _values(quantity: Quantity, samples: int, motions: Sequence[Ended]) -> Array:
-    """Errors at the samples, shape (starts, samples); NaN where a motion did not come that far."""
+    """Errors at the samples, shape (starts, samples); NaN beyond the end of a motion."""
     errors = numpy.full((len(motions), samples), numpy.nan)
     for row, motion in zip(errors, motions, strict=True):
         values = motion.values.get(quantity.text, [])
@@ -402,13 +402,13 @@ def _values(quantity: Quantity, samples: int, motions: Sequence[Ended]) -> Array
 
 
 def _add(growing: Growing, quantity: Quantity, ensemble: Ensemble, times: list[str]) -> None:
-    """RMS over starts of the largest and of the final value, the RMS over time, and its law."""
-    kept = ensemble.errors[ensemble.healthy]
+    """Add the RMS over starts of the maximum and of the final value, the series of the RMS, and its law."""
+    healthy = ensemble.errors[ensemble.healthy]
     rms, name = ensemble.rms(), quantity.text
-    texts = [_text(value, len(kept) > 0) for value in rms]
+    texts = [_text(value, len(healthy) > 0) for value in rms]
     growing.series[name] = Series(times, texts, quantity)
-    for part, values in (("max", kept.max(axis=1)), ("final", kept[:, -1])):
-        resolved = len(kept) > 0 and not (part == "final" and numpy.isnan(rms[-1]))
+    for part, values in (("max", healthy.max(axis=1)), ("final", healthy[:, -1])):
+        resolved = len(healthy) > 0 and not (part == "final" and numpy.isnan(rms[-1]))
         growing.metrics[quantity.over(part)] = _metric(values, resolved)
     growing.laws[name] = msgspec.structs.replace(law(ensemble), quantity=quantity)
 

@@ -1,4 +1,4 @@
-"""One computed motion with what a user wants beside it: attitude, Euler angles, drift."""
+"""A computed motion with its drift, attitude and Euler angles."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from heavytop.top.heavy_top import HeavyTop, State
 def motion_texts(body: HeavyTop | Body, start: State, digits: int) -> dict[str, Any]:
     """A body and its start as exact text, by the keys of every file and document.
 
-    digits: of γ, and of Ω that was given in space axes, where the attitude is irrational.
+    digits: of γ, and of Ω given in space axes, if the attitude is irrational.
     """
     texts: dict[str, Any] = {}
     if isinstance(body, HeavyTop):
@@ -52,9 +52,9 @@ def motion_texts(body: HeavyTop | Body, start: State, digits: int) -> dict[str, 
     if attitude is not None and attitude.kind in ("quaternion", "matrix"):
         texts[f"start_{attitude.kind}"] = _texts(attitude.numbers)
     elif attitude is not None:
-        # read back by score, which takes it for the rotation next to it
-        near = attitude.rational_rows(8 * digits + 128)
-        texts["start_matrix"] = [decimal_text(value, 2 * digits + 20) for row in near for value in row]
+        # read back by score, which takes the nearest rotation
+        rows = attitude.rational_rows(8 * digits + 128)
+        texts["start_matrix"] = [decimal_text(value, 2 * digits + 20) for row in rows for value in row]
         texts["start_attitude"] = f"{attitude.kind} {attitude}"
     return texts
 
@@ -64,28 +64,27 @@ def _texts(values: Sequence[Fraction]) -> list[str]:
 
 
 def xi_texts(start: State, digits: int) -> list[str] | None:
-    """ξ at t = 0 in the axes given: of the attitude, else of γ alone; exact where it is rational.
-
-    None for |γ| ≠ 1 without an attitude.
+    """ξ at t = 0 in the axes given, from the attitude, else from γ; exact if rational.  None for |γ| ≠ 1 without an
+    attitude.
     """
     if start.attitude is not None:
         rows = start.attitude.exact_rows()
         if rows is not None:
             return _texts(rows[0])
-        near = start.attitude.rational_rows(4 * digits + 64)
-        return [decimal_text(value, digits + 1) for value in near[0]]
+        rational = start.attitude.rational_rows(4 * digits + 64)
+        return [decimal_text(value, digits + 1) for value in rational[0]]
     if dot(start.gamma, start.gamma) != 1:
         return None
     return _texts(perpendicular(start.gamma))
 
 
-# Euler angles φ and ψ without jumps by whole turns, from samples of the attitude in between.
+# Euler angles φ and ψ without jumps by 2π, from additional samples of the attitude.
 #
-# φ is an azimuth about e3 in the body, ψ one in space; both turn about the poles of θ.  From one sample to the next a
-# path of length L ends within half a turn of where it began if L < d1 + d2 for the distances d1, d2 of both ends from
-# either pole, for a path that goes round on the other side is not shorter.  With the speed v at both ends and a bound a
-# of the acceleration L <= τ (v1 + v2)/2 + a τ²/4.  Where that is too long there are more samples in between, until
-# |ω| τ < 2^-14, or 50,000 samples in all: then the path goes through a pole as far as anybody can tell.
+# φ is an azimuth about e3 in the body, ψ one in space; both are singular at the poles of θ.  Between two samples the
+# azimuth along a path of length L changes by less than π if L < d1 + d2 for the distances d1, d2 of both ends from
+# either pole, for a path around the other side of the pole is not shorter.  With the speeds v1, v2 at the ends and a
+# bound a of the acceleration, L <= τ (v1 + v2)/2 + a τ²/4.  Intervals where this is too long are divided until
+# |ω| τ < 2^-14, or there are 50,000 samples in all: then the path is taken to pass through a pole.
 
 
 Angles = tuple[float, float, float]
@@ -96,7 +95,7 @@ _ANGLE_PARTS = 16
 _MOST = 50_000
 
 
-class _Seen(NamedTuple):
+class _Sample(NamedTuple):
     """(φ, θ, ψ) of one sample in rad, and the larger speed of γ in the body and of e3 in space, in rad/time unit."""
 
     angles: Angles
@@ -104,9 +103,9 @@ class _Seen(NamedTuple):
 
 
 class FollowedAngles:
-    """(φ, θ, ψ) in rad at the samples that were seen, in any order.
+    """(φ, θ, ψ) in rad at samples, which are added in any order.
 
-    problem: of the run.  start: (Ω, γ, ξ) at t = 0, in the axes whose angles these are, as are all states seen.
+    problem: of the run.  start: (Ω, γ, ξ) at t = 0; it and all states are in the axes of the angles.
     """
 
     def __init__(self, problem: Problem, start: Sequence[Fraction]) -> None:
@@ -114,70 +113,70 @@ class FollowedAngles:
         self._rate = _fastest(problem)
         inertia = problem.parameters.inertia
         self._bend = 2 + max(inertia) / min(inertia)
-        self._seen: dict[Fraction, _Seen] = {}
+        self._samples: dict[Fraction, _Sample] = {}
         self.see(Fraction(0), start)
 
     def see(self, time: Fraction, state: Any) -> None:
-        """Keep the angles of a state (Ω, γ, ξ)."""
+        """Add the angles of a state (Ω, γ, ξ)."""
         values = [float(value) for value in state]
         omega, gamma = self._problem.system.angular_velocity(self._problem.parameters, values[:6]), values[3:6]
         turning = [math.hypot(*map(float, cross(fixed, omega))) for fixed in (gamma, (0, 0, 1))]
-        self._seen[time] = _Seen(euler_angles(gamma, values[6:9], math), max(turning))
+        self._samples[time] = _Sample(euler_angles(gamma, values[6:9], math), max(turning))
 
     def samples(self, times: Sequence[Fraction]) -> list[Fraction]:
-        """``times`` with others in between, the body turning by at most 1/2 rad from one to the next.
+        """``times`` with others in between, such that the body turns by at most 1/2 rad from one to the next.
 
-        Where these would be more than 50,000 there are none in between, and angles may jump by whole turns.
+        If more than 50,000 were needed, none are added, and angles may jump by 2π.
         """
         count = math.ceil(self._rate * abs(times[-1]) / _LONGEST)
         between = set(self._parts(Fraction(0), times[-1], count) if count <= _MOST else ())
-        return sorted({*times, *between.difference(map(self._held, times))}, key=abs)
+        return sorted({*times, *between.difference(map(self._rounded, times))}, key=abs)
 
     def complete(self, follow: Callable[[Sequence[Fraction]], Any]) -> dict[Fraction, Angles]:
-        """The angles at every sample, by time.  follow: makes :meth:`see` see the states at more times, in order."""
+        """The angles at every sample, by time.  follow: integrates to further times in order, and calls :meth:`see`."""
         while more := [time for pair in pairwise(self._times()) for time in self._missing(*pair)]:
-            if len(more) + len(self._seen) > _MOST:
+            if len(more) + len(self._samples) > _MOST:
                 break
             follow(more)
         times = self._times()
-        phi, theta, psi = zip(*(self._seen[time].angles for time in times), strict=True)
+        phi, theta, psi = zip(*(self._samples[time].angles for time in times), strict=True)
         followed = zip(unwrap(phi, math.tau), theta, unwrap(psi, math.tau), strict=True)
         return dict(zip(times, followed, strict=True))
 
     def _times(self) -> list[Fraction]:
-        return sorted(self._seen, key=abs)
+        return sorted(self._samples, key=abs)
 
     def _missing(self, first: Fraction, last: Fraction) -> Iterable[Fraction]:
-        """Times in between that are needed; none where both ends are at a pole and there is nothing to follow."""
-        turned = self._rate * abs(last - first)
-        ends = self._seen[first], self._seen[last]
+        """Times needed in between; none if both ends are at a pole, where the azimuth is undefined."""
+        turn = self._rate * abs(last - first)
+        ends = self._samples[first], self._samples[last]
         apart = sum(end.angles[1] for end in ends)
-        if turned < _SHORTEST or turned > _LONGEST + 1 or apart in (0, math.tau):
+        if turn < _SHORTEST or turn > _LONGEST + 1 or apart in (0, math.tau):
             return ()
         speed = sum(Fraction(end.speed) for end in ends) / (2 * self._rate)
-        length = min(turned, turned * speed + self._bend * turned**2 / 4)
+        length = min(turn, turn * speed + self._bend * turn**2 / 4)
         return () if length < min(apart, math.tau - apart) else self._parts(first, last, _ANGLE_PARTS)
 
     def _parts(self, first: Fraction, last: Fraction, count: int) -> Iterable[Fraction]:
-        """The times in between that divide the way into equal parts, as the format holds them."""
-        inner = {self._held(first + (last - first) * i / count) for i in range(1, count)}
+        """The inner times of ``count`` equal parts, rounded to the format."""
+        inner = {self._rounded(first + (last - first) * i / count) for i in range(1, count)}
         return sorted(inner - {first, last}, key=abs)
 
-    def _held(self, time: Fraction) -> Fraction:
+    def _rounded(self, time: Fraction) -> Fraction:
         return exact(number(time, self._problem.precision))
 
 
 def _fastest(problem: Problem) -> Fraction:
-    """Not less than |ω| at any time: |Ω|² <= (Ω·IΩ + 4 |P r|)/min I by the energy (heavy top and heavy gyrostat), or by
-    |M| (gyrostat).  The rotor is added: |λ|, or |k|/min I, by which it bends the path.
+    """An upper bound of |ω|: |Ω|² <= (Ω·IΩ + 4 |P r|)/min I by the energy (heavy top and heavy gyrostat), or by |M|
+    (gyrostat).  The rotor adds |λ|, or |k|/min I.
     """
     p, omega = problem.parameters, problem.start.omega
-    least, most = min(p.inertia), max(p.inertia)
+    smallest, largest = min(p.inertia), max(p.inertia)
     twice = sum((i * w * w for i, w in zip(p.inertia, omega, strict=True)), Fraction(0))
-    square = (twice + 4 * sum(map(abs, p.moment))) * most / least**2
+    square = (twice + 4 * sum(map(abs, p.moment))) * largest / smallest**2
     root = Fraction(math.isqrt(square.numerator * square.denominator << 40) + 1, square.denominator << 20)
     rotor = sum(abs(Fraction(part)) for part in p.rotors)
-    return root + (rotor if problem.system is GYROSTAT else rotor / least)
+    return root + (rotor if problem.system is GYROSTAT else rotor / smallest)
 
 
 Reached = Callable[[Fraction], None]
@@ -189,7 +188,7 @@ _STEPS_A_PART = 100
 class Motion:
     """A trajectory from an exact start, with drift, and on request ξ and continuous Euler angles as text.
 
-    written_times: those reached, as they were given.  outputs: what else was asked for, of :meth:`output_texts`.
+    written_times: the times reached, as written in the request.  outputs: further ones, for :meth:`output_texts`.
     """
 
     top: HeavyTop | Body
@@ -208,7 +207,7 @@ class Motion:
 
     @property
     def complete(self) -> bool:
-        """Whether every time asked for was reached."""
+        """Whether every requested time was reached."""
         return self.trajectory.outcome is Outcome.SUCCESS
 
     def to_json(self) -> dict[str, Any]:
@@ -242,32 +241,32 @@ class Motion:
 
 
 class _Watcher:
-    """Keeps the states at the times asked for, their drift, and the angles at every sample, whose times ``reached``
-    hears of.
+    """Observer that stores the states at the requested times, their drift, and the angles at every sample; it passes
+    each time to ``reached``.
     """
 
     def __init__(
         self,
         problem: Problem,
         integrals: Sequence[Integral],
-        wanted: frozenset[Fraction],
+        requested: frozenset[Fraction],
         reached: Reached,
-        follow: bool,
+        with_angles: bool,
         setup: Setup,
     ) -> None:
         self.reached, self.setup = reached, setup
         self.drift = Drift(problem, integrals)
-        self.wanted = wanted
-        self.kept: list[tuple[Fraction, Any]] = []
+        self.requested = requested
+        self.samples: list[tuple[Fraction, Any]] = []
         start = (*problem.start.flat, *(problem.xi or ()))
-        self.angles = FollowedAngles(problem, setup.exactly_in_body_axes(start)) if follow else None
+        self.angles = FollowedAngles(problem, setup.exactly_in_body_axes(start)) if with_angles else None
 
     def __call__(self, time: Fraction, state: Any) -> None:
         self.reached(time)
         if self.angles is not None:
             self.angles.see(time, self.setup.in_body_axes(state))
-        if time in self.wanted:
-            self.kept.append((time, state))
+        if time in self.requested:
+            self.samples.append((time, state))
             self.drift(time, state)
 
 
@@ -284,36 +283,36 @@ def compute(
     outputs: tuple[Output, ...] = (),
     written: Sequence[str] = (),
 ) -> Motion:
-    """The motion at ``times`` (exact, checked), with the drift of every integral that holds.
+    """The motion at ``times`` (exact, checked), with the drift of every first integral.
 
-    attitude: ξ starts at the exact vector of :func:`heavytop.top.attitude.perpendicular`; φ, θ, ψ are followed through
-    samples in between, which change no bit of the states, and so are continuous but for jumps by π at the poles.
+    attitude: ξ starts at the exact vector of :func:`heavytop.top.attitude.perpendicular`; φ, θ, ψ are unwrapped with
+    additional samples, which change no bit of the states: they are continuous except for jumps by π at the poles.
     integrator: a name that `heavytop list` shows, or a source; options: of it, checked.
-    outputs: told beside the states; written: the times as they were given, none for their exact text.
-    reached: called with the times on the way, some fifty and one for each doubling; by others than heyoka and multiword
-    at the end.
+    outputs: computed with the states; written: the text of the times, empty for exact text.
+    reached: called with times for progress, some fifty and one for each doubling; only at the end for integrators other
+    than heyoka and multiword.
 
-    Raises InputError for another integrator, OutOfReach where the run would take more steps than anyone waits for.
+    Raises InputError for another integrator, OutOfReach if the run would take too many steps.
     """
     setup = Setup.of(top, start, precision, system)
     xi = setup.xi if attitude or outputs else None
     problem = Problem.of(setup.top, setup.start, precision, system, xi)
     texts_of = written or [exact_text(time) for time in times]
-    wanted = {exact(number(time, precision)): text for time, text in zip(times, texts_of, strict=True)}
+    requested = {exact(number(time, precision)): text for time, text in zip(times, texts_of, strict=True)}
     integrals = holding(setup.top, setup.start, system)
-    watcher = _Watcher(problem, integrals, frozenset(wanted), reached or (lambda time: None), attitude, setup)
+    watcher = _Watcher(problem, integrals, frozenset(requested), reached or (lambda time: None), attitude, setup)
     samples = times if watcher.angles is None else watcher.angles.samples(times)
     if reached is not None and described(integrator).streams:
-        # samples change no bit of a run, and there are far fewer than steps
+        # samples change no bit of a run, and are far fewer than steps
         steps, end = expected_steps(problem, times[-1]), times[-1]
         evenly = [end * i / _PARTS for i in range(1, _PARTS)] if steps > _STEPS_A_PART * _PARTS else []
         early = [end / 2**n for n in range(1, steps.bit_length())]
-        on_the_way = {exact(number(time, precision)) for time in (*evenly, *early)}
-        samples = sorted({*samples, *(on_the_way - wanted.keys())}, key=abs)
+        intermediate = {exact(number(time, precision)) for time in (*evenly, *early)}
+        samples = sorted({*samples, *(intermediate - requested.keys())}, key=abs)
     options = (options or {}) | ({} if xi is None else {"xi": xi})
     propagate = registry.watched(integrator, options, watcher)
     run = propagate(setup.top, setup.start, samples, precision, system=system)
-    run = replace(run, times=tuple(time for time, _ in watcher.kept), states=tuple(state for _, state in watcher.kept))
+    run = replace(run, times=tuple(t for t, _ in watcher.samples), states=tuple(y for _, y in watcher.samples))
     run = setup.given(run)
     texts = run.texts()
     attitudes = angles = None
@@ -325,14 +324,14 @@ def compute(
         followed = watcher.angles.complete(lambda more: again(setup.top, setup.start, more, precision, system=system))
         attitudes = [line[6:] for line in texts]
         angles = [_angles(state, followed[time], precision) for time, state in zip(run.times, run.states, strict=True)]
-    reached_times = [str(wanted[time]) for time, _ in watcher.kept]
+    reached_times = [str(requested[time]) for time, _ in watcher.samples]
     states, drift = [line[:6] for line in texts], watcher.drift.metrics()
     return Motion(top, start, run, states, drift, attitudes, angles, reached_times, outputs)
 
 
 @whole_evaluation
 def _angles(state: Any, followed: Sequence[float], precision: Precision) -> list[str]:
-    """(φ, θ, ψ) of one state, shifted by the whole turns that were followed; ``nan`` at a pole."""
+    """(φ, θ, ψ) of one state, shifted by multiples of 2π to ``followed``; ``nan`` at a pole."""
     with working_precision(precision.bits + GUARD_BITS):
         values = to_balls(state)
         angles = euler_angles(values[3:6], values[6:9], FUNCTIONS)

@@ -1,4 +1,4 @@
-"""The library call behind ``heavytop reference``: proven states as decimal text, with the radius of each."""
+"""References: proven states, and outputs of the attitude, as decimal text with radii."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ from heavytop.top.equations import HEAVY_TOP, NAMES, System
 from heavytop.top.heavy_top import HeavyTop, State, TimeText
 from heavytop.top.stability import Stability, stability
 
-# What a reference tells of the attitude, as balls: each to the digits asked, from a state of some more bits.
+# Outputs of the attitude as balls, each to the requested digits, from states of more bits.
 
 
-Whole = Callable[[Fraction, int], Sequence[Any]]
-"""Ω, γ and ξ at (time, bits): nine balls."""
+Evaluate = Callable[[Fraction, int], Sequence[Any]]
+"""(time, bits) -> nine balls: Ω, γ and ξ."""
 GUARD_BITS = 32
-"""Bits of a state beyond those asked for: no output loses so many but Euler angles near gimbal lock."""
+"""Bits of a state beyond those requested; only Euler angles near gimbal lock lose more."""
 _WORKING_BITS = 32
 _ATTEMPTS = 5
 _SMALL = Fraction(1, 10**290)
@@ -58,16 +58,15 @@ UNDEFINED = "nan", "inf"
 
 
 class KnownMotion:
-    """A known motion at the times of a reference, to be asked for outputs; it keeps the balls that were evaluated.
+    """A known motion at the times of a reference, and its outputs; evaluated balls are cached.
 
-    whole: Ω, γ, ξ.  times: exact.  digits: of each output.  centre: of mass.  gamma: at t = 0.  method: for errors.
-    as_written: the balls are those that were printed, and no others are to be had; outputs are as wide as they make
-    them.
+    evaluate: Ω, γ, ξ.  times: exact.  digits: of each output.  centre: of mass.  gamma: at t = 0.  method: for errors.
+    as_written: the balls are the printed ones, which cannot be refined; outputs have the width that follows from them.
     """
 
     def __init__(
         self,
-        whole: Whole,
+        evaluate: Evaluate,
         times: Sequence[Fraction],
         digits: int,
         centre: Vector,
@@ -75,31 +74,31 @@ class KnownMotion:
         method: str,
         as_written: bool = False,
     ) -> None:
-        self.whole, self.times, self.digits, self.method = whole, times, digits, method
+        self.evaluate, self.times, self.digits, self.method = evaluate, times, digits, method
         self.centre, self.gamma, self.as_written = centre, gamma, as_written
         self._unit = dot(gamma, gamma) == 1
-        self._kept: dict[int, Sequence[arb]] = {}
+        self._cached: dict[int, Sequence[arb]] = {}
         self._signs: list[int] | None = None
 
     def at(self, index: int, extra: int = GUARD_BITS) -> Sequence[arb]:
-        """Ω, γ and ξ at the time of that place, of ``extra`` bits more than the digits take."""
+        """Ω, γ and ξ at the time of that index, with ``extra`` bits more than the digits need."""
         if extra != GUARD_BITS:
-            return self.whole(self.times[index], bits_of(self.digits) + extra)
-        if index not in self._kept:
-            self._kept[index] = self.whole(self.times[index], bits_of(self.digits) + extra)
-        return self._kept[index]
+            return self.evaluate(self.times[index], bits_of(self.digits) + extra)
+        if index not in self._cached:
+            self._cached[index] = self.evaluate(self.times[index], bits_of(self.digits) + extra)
+        return self._cached[index]
 
     def balls(self, output: Output) -> list[list[arb | None]]:
-        """The output at every time, flat, each to the digits asked; None for an Euler angle that is not defined.
+        """The output at every time, flat, to the requested digits; None for an undefined Euler angle.
 
-        A position is right to the digits relative to |p|, any other number relative to a size above 1.
-        Raises OutOfReach where the digits cannot be proven.
+        A position is accurate to the digits relative to |p|, any other number relative to a size above 1.
+        Raises OutOfReach if the digits cannot be proven.
         """
         narrow = self._narrow(output)
         outputs = [self._value(index, output, narrow) for index in range(len(self.times))]
         if output.name == "quaternion" and outputs:
             turns = self.signs(outputs)
-            # a ball is negated exactly: the minus sign would round it to FLINT's precision of the moment
+            # negated exactly: the minus sign would round to FLINT's current precision
             return [
                 [part.neg(exact=True) if part is not None and sign < 0 else part for part in q]
                 for q, sign in zip(outputs, turns, strict=True)
@@ -107,14 +106,14 @@ class KnownMotion:
         return outputs
 
     def signs(self, quaternions: Sequence[Sequence[Any]]) -> list[int]:
-        """±1 for each quaternion, in the order of the times: continuous from t = 0 forwards and from it backwards."""
+        """±1 for each quaternion, in the order of the times: continuous from t = 0 forwards and backwards."""
         if self._signs is None:
             start, factors = self._start(), [1] * len(self.times)
             floats = numpy.array([[float(part) for part in q] for q in quaternions])
             for side in (1, -1):
-                places = [p for p, time in enumerate(self.times) if (time >= 0) == (side > 0)]
-                places.sort(key=lambda p: abs(self.times[p]))
-                for index, sign in zip(places, signs(start, floats[places]) if places else (), strict=True):
+                indices = [i for i, time in enumerate(self.times) if (time >= 0) == (side > 0)]
+                indices.sort(key=lambda i: abs(self.times[i]))
+                for index, sign in zip(indices, signs(start, floats[indices]) if indices else (), strict=True):
                     factors[index] = int(sign)
             self._signs = factors
         return self._signs
@@ -122,22 +121,22 @@ class KnownMotion:
     @whole_evaluation
     def _start(self) -> list[float]:
         bits = bits_of(self.digits) + GUARD_BITS
-        q = [midpoint(part) for part in self._evaluated(self.whole(Fraction(0), bits), bits, Output("quaternion"))]
+        q = [midpoint(part) for part in self._evaluated(self.evaluate(Fraction(0), bits), bits, Output("quaternion"))]
         sign = first_sign(q, Fraction(1, 1 << bits_of(self.digits)))
         return [sign * float(part) for part in q]
 
     def _value(self, index: int, output: Output, narrow: float) -> list[arb | None]:
-        asked, extra = bits_of(self.digits), GUARD_BITS
-        most = 2 * asked + 2 * GUARD_BITS if output.name == "euler" else math.inf
+        bits, extra = bits_of(self.digits), GUARD_BITS
+        most_extra = 2 * bits + 2 * GUARD_BITS if output.name == "euler" else math.inf
         state = self.at(index)
         for _ in range(_ATTEMPTS):
-            values = self._evaluated(state, asked + extra, output)
+            values = self._evaluated(state, bits + extra, output)
             lacking = max(self._lacking(value, output, narrow) for value in values)
             if lacking <= 0:
                 return list(values)
-            if extra >= most or (output.name == "euler" and self._locked(state, output)):
+            if extra >= most_extra or (output.name == "euler" and self._locked(state, output)):
                 break
-            extra += int(lacking) + GUARD_BITS if lacking < math.inf else asked + GUARD_BITS
+            extra += int(lacking) + GUARD_BITS if lacking < math.inf else bits + GUARD_BITS
             try:
                 state = self.at(index, extra)
             except OutOfReach:
@@ -153,21 +152,21 @@ class KnownMotion:
         )
 
     @whole_evaluation
-    def _locked(self, whole: Sequence[arb], output: Output) -> bool:
-        """Whether two Euler angles turn about one axis, exactly."""
-        return bool(euler_terms(rows_of(whole[3:6], whole[6:]), output.sequence)[1][0].is_zero())
+    def _locked(self, state: Sequence[arb], output: Output) -> bool:
+        """Whether the gimbal lock is exact: two Euler angles turn about one axis."""
+        return bool(euler_terms(rows_of(state[3:6], state[6:]), output.sequence)[1][0].is_zero())
 
     @whole_evaluation
-    def _evaluated(self, whole: Sequence[arb], bits: int, output: Output) -> list[arb]:
+    def _evaluated(self, state: Sequence[arb], bits: int, output: Output) -> list[arb]:
         with working_precision(bits + _WORKING_BITS):
-            omega, gamma, xi = whole[:3], whole[3:6], whole[6:]
+            omega, gamma, xi = state[:3], state[3:6], state[6:]
             if not self._unit:
                 length = ball(dot(self.gamma, self.gamma)).sqrt()
                 gamma = [part / length for part in gamma]
             return list(output.at(omega, gamma, xi, self.centre, _BALLS, ball))
 
     def _narrow(self, output: Output) -> float:
-        """A radius of a position that is small enough at any rate; 0 where doubles do not tell, and of others."""
+        """A sufficient radius of a position in double; 0 out of the range of doubles, and for other outputs."""
         if output.name != "position":
             return 0.0
         size = max(abs(part) for part in (*output.point_of(self.centre), *output.pivot))
@@ -175,7 +174,7 @@ class KnownMotion:
         return float(size * tenth) if _SMALL < size * tenth < 1 else 0.0
 
     def _lacking(self, value: arb, output: Output, narrow: float) -> float:
-        """Bits by which a ball is too wide; inf where it is not finite.  narrow: of :meth:`_narrow`."""
+        """Bits by which a ball is too wide; inf if it is not finite.  narrow: from :meth:`_narrow`."""
         if not value.is_finite():
             return math.inf
         if self.as_written or value.is_exact():
@@ -188,15 +187,15 @@ class KnownMotion:
         scale = max(Fraction(1), abs(midpoint(value)))
         if output.name == "position":
             scale = max(abs(part) for part in (*output.point_of(self.centre), *output.pivot))
-        # the printed value is rounded to one digit more than was asked for, by at most half a unit of it
-        most, wide = scale * Fraction(9, 10 ** (self.digits + 1)), radius(value)
-        if wide <= most:
+        # the printed value is rounded to one digit more than requested, by at most half a unit of it
+        allowed, width = scale * Fraction(9, 10 ** (self.digits + 1)), radius(value)
+        if width <= allowed:
             return 0
-        return (wide / most).__ceil__().bit_length() if most else math.inf
+        return (width / allowed).__ceil__().bit_length() if allowed else math.inf
 
 
 def _atan2(y: arb, x: arb) -> arb:
-    """atan2 in (−π, π], but that a ball which reaches over the cut lies around π."""
+    """atan2 in (−π, π]; a ball that crosses the branch cut encloses π."""
     if x < 0 and not (y > 0 or y < 0):
         return arb.pi() + arb.atan2(-y, -x)
     return arb.atan2(y, x) if not (y.contains(0) and x.contains(0)) else arb("nan")
@@ -206,12 +205,12 @@ _BALLS = SimpleNamespace(**vars(FUNCTIONS) | {"sqrt": root, "atan2": _atan2})
 
 
 def text(value: arb | None, digits: int) -> tuple[str, str]:
-    """(value, radius) as decimal text, of one digit more than is proven; ``nan`` and ``inf`` for what is undefined."""
+    """(value, radius) as decimal text, with one digit more than is proven; ``nan`` and ``inf`` for None."""
     return UNDEFINED if value is None else value_text(value, digits + 1)
 
 
 def nearest(value: arb | None) -> float:
-    """The double nearest to the middle of a ball; nan for what is undefined."""
+    """The double nearest to the midpoint of a ball; nan for None."""
     return math.nan if value is None else float(midpoint(value))
 
 
@@ -225,7 +224,7 @@ def as_written(
     gamma: Sequence[str],
     start_xi: Sequence[str],
 ) -> KnownMotion:
-    """A known motion out of printed balls: what has a ``value`` and a ``radius`` as text."""
+    """A known motion from printed balls: objects with a ``value`` and a ``radius`` as text."""
     with working_precision(bits_of(digits) + 2 * GUARD_BITS):
         lines = [
             [ball(exact(component.value)) + arb(0, ball(exact(component.radius))) for component in (*y, *xi)]
@@ -236,28 +235,28 @@ def as_written(
     instants = [exact(str(time)) for time in times]
     states_at = {Fraction(0): at_start, **dict(zip(instants, lines, strict=True))}
 
-    def whole(time: Fraction, bits: int) -> Sequence[Any]:
+    def known(time: Fraction, bits: int) -> Sequence[Any]:
         return states_at[time]
 
-    return KnownMotion(whole, instants, digits, vector(centre, "centre"), start, "the printed balls", as_written=True)
+    return KnownMotion(known, instants, digits, vector(centre, "centre"), start, "the printed balls", as_written=True)
 
 
 DIGITS = range(1, 20001)
 _SHOWN = 15
-"""Up to so many digits the components of a state stand beside each other in a table."""
+"""The most digits of a table with one state per row."""
 _WIDE, _ENDS = 58, 2
-"""Characters of a number in a row, and times at either end that are shown of many."""
+"""Characters of a number per row, and the number of first and last times shown of many."""
 
 
 class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=True, dict=True, kw_only=True):
     """Proven states; its JSON is that of ``heavytop reference``.
 
-    written_times: ``times`` in JSON, as they were given.  states: Ω1 Ω2 Ω3 γ1 γ2 γ3 at each.
+    written_times: ``times`` in JSON, as written in the request.  states: Ω1 Ω2 Ω3 γ1 γ2 γ3 at each.
     attitude: on request, ξ1 ξ2 ξ3 at each; a unit vector fixed in space and ⟂ γ, in body components, which starts at
-    the ξ(0) of `heavytop docs outputs`; attitude_method: how it is known; xi: ξ at t = 0.
+    the ξ(0) of `heavytop docs outputs`; attitude_method: its source; xi: ξ at t = 0.
     inertia, weight, centre, rotor, omega, gamma: the data, exactly.
-    source: where the formulas of the method are published.
-    derivatives: on request, with respect to the start and the data.  stability: of a motion that is steady.
+    source: the publication of the formulas of the method.
+    derivatives: on request, with respect to the start and the data.  stability: of a steady motion.
     """
 
     method: str
@@ -286,7 +285,7 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
 
     @property
     def times(self) -> list[TimeText]:
-        """Exact text, as it was given, which ``float`` and ``Fraction`` read."""
+        """Exact text, as written in the request; ``float`` and ``Fraction`` read it."""
         return [TimeText(time) for time in self.written_times]
 
     @overload
@@ -299,8 +298,8 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
         """The values as decimal text, shape (n, 6).
 
         Arguments:
-            of: "quaternion", "matrix", "euler:ZXZ", "position" or "omega-space" for the values of that in place of the
-                states, in the shape of its array.
+            of: "quaternion", "matrix", "euler:ZXZ", "position" or "omega-space" for the values of that output instead
+                of the states, in the shape of its array.
             point, pivot: as in :meth:`heavytop.measure.reference.Reference.positions`.
 
         Raises InputError for another output, and for a reference without attitude.
@@ -310,7 +309,7 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
         return [[ball.value for ball in state] for state in self.states]
 
     def balls(self, of: str | Output, *, point: Any = None, pivot: Any = None) -> list[Any]:
-        """An output as balls in the shape of its array; "nan" within "inf" for what is not defined.
+        """An output as balls in the shape of its array; value "nan" and radius "inf" if undefined.
 
         of, point, pivot: as in :meth:`texts`.  Each number is proven to ``digits``, relative to a size above 1; a
         position relative to |p|.
@@ -323,7 +322,7 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
         return cast("dict[str, Any]", msgspec.to_builtins(self)) | values
 
     def require_outputs(self, outputs: Sequence[Output]) -> None:
-        """Evaluates them, so that they are there when they are asked for; raises OutOfReach as :meth:`balls` does."""
+        """Raise OutOfReach as :meth:`balls` does; the evaluated balls are cached for later requests."""
         for what in outputs:
             self._known().balls(what)
 
@@ -332,12 +331,12 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
         return values.reshape(-1, *what.shape)
 
     def _outputs(self, what: Output, write: Callable[[Any], Any]) -> list[Any]:
-        """The output at every time in its shape, each number as ``write`` makes it of a ball, or of None."""
+        """The output at every time in its shape; ``write`` converts each ball, or None."""
         balls = self._known().balls(what)
         return [shaped([write(value) for value in line], what.shape) for line in balls]
 
     def _known(self) -> KnownMotion:
-        """The motion behind the states; of a reference that was read or copied, the balls that are written in it."""
+        """The motion of the states; for a reference that was read or copied, its printed balls."""
         motion: KnownMotion | None = self.__dict__.get("_motion")
         if motion is None:
             if self.attitude is None or self.centre is None or self.gamma is None or self.xi is None:
@@ -355,7 +354,7 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
         return numpy.array([[float(ball.value) for ball in state] for state in self.states])
 
     def radii(self) -> NDArray[numpy.float64]:
-        """The radii rounded up to double, shape (n, 6): they stay upper bounds, and none but 0 becomes 0."""
+        """The radii rounded up to double, shape (n, 6): still upper bounds, and 0 only for 0."""
         return numpy.array([[rounded_up(ball.radius) for ball in state] for state in self.states])
 
     def _repr_html_(self) -> str:
@@ -364,17 +363,17 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
         return self._table().html() + picture
 
     def derivatives_numpy(self) -> NDArray[numpy.float64] | dict[str, NDArray[numpy.float64]]:
-        """∂y_i(t)/∂y_j(0) in double, shape (n, 6, 6); where data were asked for, a dict of "start" and "data".
+        """∂y_i(t)/∂y_j(0) in double, shape (n, 6, 6); with data, a dict of "start" and "data".
 
-        Raises InputError where none were asked for.
+        Raises InputError if no derivatives were requested.
         """
         return self._derivatives().numpy()
 
     def lyapunov(self) -> list[Ball | None]:
         """The finite-time Lyapunov exponent at each time, in 1/time unit, with its radius; None at t = 0.
 
-        It is the logarithm of the largest singular value of ∂y(t)/∂y(0) over |t|.  Raises InputError where the
-        derivatives with respect to the start were not asked for.
+        It is the logarithm of the largest singular value of ∂y(t)/∂y(0) over |t|.  Raises InputError if the
+        derivatives with respect to the start were not requested.
         """
         exponents = self._derivatives().lyapunov
         if exponents is None:
@@ -403,7 +402,7 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
         return TitledTable(title, ("t", *NAMES), rows, notes)
 
     def _long_rows(self) -> list[list[str]]:
-        """All digits, a number a row, which goes on below where it is long; of many times the first and the last."""
+        """All digits, one number per row, a long one continued below; of many times only the first and the last."""
         rows: list[list[str]] = []
         count = len(self.times)
         for index, (time, state) in enumerate(zip(self.times, self.states, strict=True)):
@@ -420,7 +419,7 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
 
 
 def rounded_up(text: str) -> float:
-    """A decimal text as the nearest double that is not less."""
+    """The smallest double not below a decimal text."""
     value = float(text)
     return value if Fraction(value) >= Fraction(text) else math.nextafter(value, math.inf)
 
@@ -438,10 +437,10 @@ def reference(
 ) -> Reference:
     """The states at ``times`` to ``digits`` digits: each within 10^-digits, relative above 1 and absolute below.
 
-    times: exact numbers in any order.  digits: 1 to 20,000.  attitude: give ξ too.  derivatives: "start", "data" or
-    "all" for those too.  effort: of an enclosure, :class:`heavytop.exact.enclosure.run.Validated`.
-    Raises InputError for other digits, for a time that is not a finite rational, and where the system does not admit
-    the start; OutOfReach where the digits cannot be proven, and for numbers of more than 9,000 digits.
+    times: exact numbers in any order.  digits: 1 to 20,000.  attitude: with ξ.  derivatives: "start", "data" or "all"
+    for these too.  effort: of an enclosure, :class:`heavytop.exact.enclosure.run.Validated`.
+    Raises InputError for other digits, for a time that is not a finite rational, and if the system does not admit the
+    start; OutOfReach if the digits cannot be proven, and for numbers of more than 9,000 digits.
     """
     if digits not in DIGITS:
         raise InputError(f"digits must be from 1 to 20000; got {quoted(digits)}.", "Give, for example, 50.")
@@ -469,8 +468,8 @@ def reference(
         states = [known_texts(known.state(time, bits), known.method, time, digits) for time in instants]
         return msgspec.structs.replace(result, states=states)
     latest = max(instants, key=abs, default=Fraction(0))
-    method, whole = known.known_attitude(latest, bits_of(digits) + GUARD_BITS)
-    motion = KnownMotion(whole, instants, digits, top.centre, start.gamma, method)
+    method, evaluate = known.known_attitude(latest, bits_of(digits) + GUARD_BITS)
+    motion = KnownMotion(evaluate, instants, digits, top.centre, start.gamma, method)
     parts = [known_texts(motion.at(index), method, time, digits) for index, time in enumerate(instants)]
     result = msgspec.structs.replace(
         result,
@@ -485,7 +484,7 @@ def reference(
 
 @whole_evaluation
 def start_texts(gamma: Vector, digits: int) -> list[str]:
-    """ξ at t = 0 of a γ that is not of length 1, in balls."""
+    """ξ at t = 0 for a γ of length other than 1, as rounded text."""
     with working_precision(bits_of(digits) + GUARD_BITS):
         return [value_text(value, digits + 1)[0] for value in initial_xi(gamma)]
 

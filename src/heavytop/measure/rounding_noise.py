@@ -1,8 +1,8 @@
-"""How far rounding noise alone moves a metric: the same motion computed again with other roundings.
+"""Rounding noise of metrics, from reruns of a motion with other roundings.
 
-Inertia and weight times a common factor are another top with the same motions Ω(t), γ(t): the equations (1.1) are
-homogeneous in them. With 1 + j/2^20 for the factor, dyadic data stay dyadic and every equality that defines a case
-stays, but each rounding on the way is another one. Integrals are multiplied by less than 1.04, which no band notices.
+A top whose inertia and weight are multiplied by a common factor has the same motions Ω(t), γ(t): the equations (1.1)
+are homogeneous in them. Factors 1 + j/2^20 keep dyadic data dyadic, and every equality that defines a case, but change
+each rounding of the run. They multiply integrals by less than 1.04, which is negligible against any band.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from heavytop.top.equations import GYROSTAT, Parameters
 from heavytop.top.heavy_top import HeavyTop
 
 RERUNS = 15
-"""Runs with other roundings, beside the row's own."""
+"""The number of reruns of a row."""
 MOST_SEEDS = 1000
 _BITS, FACTORS, _STRIDE = 20, 2**14, 10125
-"""Factors are 1 + j/2^20 with j < 2^14, an odd stride apart so that those of one row differ in all their bits."""
+"""Factors are 1 + j/2^20 with j < 2^14; the odd stride makes those of one row differ in all their bits."""
 _CENTRAL = 0.95
 
 
@@ -48,7 +48,7 @@ def scaled(top: HeavyTop, by: Fraction) -> HeavyTop:
 
 
 def least(metrics: Mapping[str, Metric], metric: Metric) -> float:
-    """log10 of what an error counts as at least, -inf for most: a last value below the RMS of its row is chance."""
+    """log10 of the smallest size at which an error counts, -inf for most: a final value below its RMS is chance."""
     quantity = metric.quantity
     if quantity is None or quantity.statistic != "final":
         return -math.inf
@@ -59,9 +59,9 @@ def least(metrics: Mapping[str, Metric], metric: Metric) -> float:
 def bands(runs: Sequence[Mapping[str, Metric]], floor: float, own: Mapping[str, Metric]) -> dict[str, float]:
     """The band of each error over runs that differ in their roundings alone: half its 95 % interval, in decades.
 
-    floor: log10 below which all errors are the same.  own: the run that the bands are for.  It counts where it came out
-    no larger than the others: chance may have made it small, but must not excuse what went wrong.
-    Metrics that are not finite or missing in some run have no band.
+    floor: log10 below which errors are equal.  own: the metrics of the run that the bands belong to.  A metric of it
+    counts if it is no larger than the others: it may be small by chance, but a large one must not widen its own band.
+    Metrics that are non-finite or missing in some run have no band.
     """
     bands = {}
     for name in runs[0]:
@@ -75,16 +75,16 @@ def bands(runs: Sequence[Mapping[str, Metric]], floor: float, own: Mapping[str, 
 
 
 def duration_band(times: Sequence[float], own: float, expected: float) -> float:
-    """The band in decades of a duration ``own`` > 0 that noise moves as it moves ``times``, by addition.
+    """The band in decades of a duration ``own`` > 0 with the additive noise of ``times``.
 
-    expected: what the duration would be among those; it counts where it is no shorter than they are.
+    expected: the equivalent of ``own`` among ``times``; it counts if it is not shorter than all of them.
     """
     family = [*times, expected] if expected >= min(times) else times
     return round(math.log10(1 + _spread(family) / own), 4)
 
 
 def _size(run: Mapping[str, Metric], name: str) -> float:
-    """log10 of an error; -inf for 0, NaN for the words."""
+    """log10 of an error; -inf for 0, NaN for a metric that is not a number."""
     metric = run.get(name)
     if metric is None or (metric.log10 is None and metric.value != "0"):
         return math.nan
@@ -92,27 +92,25 @@ def _size(run: Mapping[str, Metric], name: str) -> float:
 
 
 def _spread(values: Sequence[float]) -> float:
-    """√½ of the 95 % quantile of the distance of two values, so that two bands in quadrature are the interval of the
-    difference.
-    """
+    """√½ of the 95 % quantile of pairwise distances: bands add in quadrature to the interval of a difference."""
     first, second = numpy.triu_indices(len(values), 1)
     gaps = numpy.abs(numpy.take(values, first) - numpy.take(values, second))
     return round(float(numpy.quantile(gaps, _CENTRAL)) / math.sqrt(2), 4)
 
 
-# The rounding noise of one trajectory: its motion computed again with other roundings.
+# The rounding noise of one trajectory, from reruns.
 #
-# Rounding noise is free of scale: the reruns are in double, whatever the format of the run.
+# Rounding noise scales with eps: the reruns are in double for every format of the run.
 
 
 _STEPS = 20_000
-"""A longer run is rerun over about its first so many steps only."""
+"""The largest number of steps of a rerun, approximately; a longer run is rerun in part."""
 _STEPS_SINGLY = 2000
 """Steps of a rerun by an integrator that takes one motion at a time."""
 _SAMPLES, _SAMPLES_OF_CHAOS = 32, 64
-"""The second without a closed form: of a chaotic motion the last samples with a digit left decide the largest error."""
+"""The second without a closed form: the largest error of a chaotic motion is that of its last significant samples."""
 _FACTOR_BITS = 32
-"""Bits of a top whose multiples by 1 + j/2^20 are exact in double: all its reruns then have one reference."""
+"""With data of so many bits, multiples by 1 + j/2^20 are exact in double: all reruns share one reference."""
 _FLOOR = math.log10(float(DOUBLE.eps)) - 1
 
 Metrics = dict[str, Metric]
@@ -120,7 +118,7 @@ Metrics = dict[str, Metric]
 
 @dataclass(frozen=True, slots=True)
 class Reruns:
-    """How a run is computed again: in double, from the exact data ``problem``, with the roundings of ``seed``."""
+    """Reruns in double from the exact data ``problem``, with the roundings of ``seed``."""
 
     problem: Problem
     integrator: Integrator
@@ -128,38 +126,38 @@ class Reruns:
 
     @property
     def possible(self) -> bool:
-        """Whether the integrator can be given the same motion with other roundings."""
+        """Whether the integrator accepts the motion with other roundings."""
         return self.problem.system is not GYROSTAT or bool(self.integrator.ensemble)
 
-    def drift_bands(self, run: Trajectory, asked: Sequence[Fraction], metrics: Metrics, true: Truth | str) -> Metrics:
-        """``metrics`` of a run with their bands; as they are where it failed, or cannot be computed again.
+    def drift_bands(self, run: Trajectory, times: Sequence[Fraction], metrics: Metrics, true: Truth | str) -> Metrics:
+        """``metrics`` of a run with their bands; unchanged if it failed, or reruns are not possible.
 
-        asked: the times of the run.  true: what its states were compared with, or why with nothing.
+        times: of the run.  true: the reference of its states, or why there is none.
         """
         if run.outcome is not Outcome.SUCCESS or not self.possible:
             return metrics
-        most = _STEPS if self.integrator.ensemble else _STEPS_SINGLY
-        end = asked[-1] if run.steps <= most else asked[-1] * most / run.steps
+        step_limit = _STEPS if self.integrator.ensemble else _STEPS_SINGLY
+        end = times[-1] if run.steps <= step_limit else times[-1] * step_limit / run.steps
         if not isinstance(true, str) and not true.covers(end):
             end = true.ends or end
-        problem = _short(self.problem)
+        problem = _shortened(self.problem)
         samples = _SAMPLES if closed_form(problem) else _SAMPLES_OF_CHAOS
-        times = [exact(number(time, DOUBLE)) for time in some_of(asked, end, samples)]
-        truth: Truth | str = true if isinstance(true, str) else uncertified(problem, times)
-        reruns = self._of(problem, times, lambda problem: Scorer(problem, truth))
+        rerun_times = [exact(number(time, DOUBLE)) for time in some_of(times, end, samples)]
+        truth: Truth | str = true if isinstance(true, str) else uncertified(problem, rerun_times)
+        reruns = self._rerun(problem, rerun_times, lambda problem: Scorer(problem, truth))
         return banded(run, metrics, [scorer.metrics() for scorer in reruns])
 
     def of(self, times: Sequence[Fraction], scorer: Callable[[Problem], Scorer]) -> list[Scorer]:
         """The scorers of the reruns."""
-        return self._of(self.problem, times, scorer)
+        return self._rerun(self.problem, times, scorer)
 
-    def _of(self, problem: Problem, times: Sequence[Fraction], scorer: Callable[[Problem], Scorer]) -> list[Scorer]:
-        """The scorers of the same motion with other roundings."""
+    def _rerun(self, problem: Problem, times: Sequence[Fraction], scorer: Callable[[Problem], Scorer]) -> list[Scorer]:
+        """The scorers of the reruns of ``problem``."""
         p = problem.parameters
         problems = []
         for index in range(1, RERUNS + 1):
             scale = factor(self.seed, index)
-            problems.append(replace(problem, parameters=_each(p, partial(mul, scale))))
+            problems.append(replace(problem, parameters=_mapped_masses(p, partial(mul, scale))))
         scorers = [scorer(problem) for problem in problems]
         self.integrator.propagate_many(problems, times, lambda i, time, state: scorers[i](time, state), threads=1)
         flush_together(scorer.error for scorer in scorers if scorer.error is not None)
@@ -167,10 +165,10 @@ class Reruns:
 
 
 def some_of(times: Sequence[Fraction], end: Fraction, most: int) -> list[Fraction]:
-    """At most so many of ``times``, evenly through those up to ``end``, with the last of them.
+    """At most ``most`` of ``times``, evenly distributed among those up to ``end``, with the last of them.
 
-    The run's own times and no others: between its steps an integrator may have another error than at their ends.
-    Where the first of them is beyond ``end``, as many times as there are in the same proportions.
+    Only times of the run are taken: between steps the error of an integrator may differ from that at their ends.
+    If the first is beyond ``end``, all times are scaled to end there.
     """
     early = [time for time in times if abs(time) <= abs(end)] or [time * end / times[-1] for time in times]
     count = min(most, len(early))
@@ -180,25 +178,25 @@ def some_of(times: Sequence[Fraction], end: Fraction, most: int) -> list[Fractio
 def escape_band(own: Fraction, escapes: Sequence[Fraction], rate: float, bits: int) -> float:
     """The band in decades of an escape time of a run with ``bits`` bits, from those of reruns in double.
 
-    The rounding noise of an escape time is added to it, some ln 2/rate in every format.
+    The rounding noise of an escape time is additive, some ln 2/rate in every format.
     """
-    time, gained = float(own), (bits - DOUBLE.bits) * math.log(2) / rate
-    return duration_band([float(escape) for escape in escapes], time, time - gained)
+    time, delay = float(own), (bits - DOUBLE.bits) * math.log(2) / rate
+    return duration_band([float(escape) for escape in escapes], time, time - delay)
 
 
-def _short(problem: Problem) -> Problem:
-    return replace(problem, parameters=_each(problem.parameters, lambda value: round_to(value, _FACTOR_BITS)))
+def _shortened(problem: Problem) -> Problem:
+    return replace(problem, parameters=_mapped_masses(problem.parameters, lambda value: round_to(value, _FACTOR_BITS)))
 
 
-def _each(p: Parameters, change: Callable[[Fraction], Fraction]) -> Parameters:
-    """The parameters with every number changed that is proportional to a mass: λ of the gyrostat stays."""
+def _mapped_masses(p: Parameters, change: Callable[[Fraction], Fraction]) -> Parameters:
+    """The parameters with ``change`` applied to every number proportional to a mass: λ of the gyrostat stays."""
     inertia, moment = (tuple(map(change, part)) for part in (p.inertia, p.moment))
     rotor = tuple(map(change, p.rotor)) if isinstance(p.rotor, tuple) else p.rotor
     return p._replace(inertia=inertia, moment=moment, rotor=rotor)
 
 
 def banded(run: Trajectory, metrics: Metrics, reruns: Sequence[Metrics]) -> Metrics:
-    """The metrics with the bands of the reruns, the run itself beside them in units of its eps."""
+    """The metrics with the bands of the reruns; the run itself counts in units of its eps."""
     coarser = math.log10(2) * (run.problem.precision.bits - DOUBLE.bits)
     own = {
         name: metric if metric.log10 is None else replace_struct(metric, log10=metric.log10 + coarser)

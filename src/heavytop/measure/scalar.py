@@ -1,4 +1,4 @@
-"""From balls to the numbers of a report, and from native numbers to balls."""
+"""Conversions of balls to the numbers of a report, and of native numbers to balls."""
 
 from __future__ import annotations
 
@@ -30,9 +30,7 @@ _WIDE = ("longdouble", "real128", "real")
 
 
 def to_ball(value: Any) -> arb:
-    """A native number as a ball of radius 0 (working precision permitting); NaN and infinities, and balls, stay what
-    they are.
-    """
+    """A native number as a ball of radius 0 (working precision permitting); NaN, infinities and balls stay."""
     if isinstance(value, arb):
         return value
     if isinstance(value, float):
@@ -51,27 +49,27 @@ def to_balls(state: Sequence[Any]) -> list[arb]:
 
 
 def _by_doubles(value: Any) -> arb | None:
-    """A wide native float as the sum of doubles, exactly; None for other numbers, and beyond the range of doubles."""
+    """A wide native float as an exact sum of doubles; None for other numbers, and beyond the range of doubles."""
     if type(value).__name__ not in _WIDE:
         return None
-    total, left = arb(0), value
-    while part := float(left):
+    total, remainder = arb(0), value
+    while part := float(remainder):
         if not isfinite(part):
             return None
-        total, left = total + arb(part), left - part
-    return total if left == 0 else None
+        total, remainder = total + arb(part), remainder - part
+    return total if remainder == 0 else None
 
 
 def resolved(value: arb) -> bool:
     """Whether |value| is at least ten times its radius, or exactly 0."""
-    # with so many bits right |value| is above 64 radii, whatever the rest of its bits
+    # at that relative accuracy |value| exceeds 64 radii
     if value.rel_accuracy_bits() >= _SURELY_RESOLVED:
         return bool(value.is_finite())
     return bool(value.is_finite()) and abs(midpoint(value)) >= RESOLVED_RADII * radius(value)
 
 
 def decided(value: arb) -> bool:
-    """Whether :func:`text` is the same of all numbers in a ball."""
+    """Whether all numbers in a ball have the same :func:`text`."""
     if not resolved(value):
         return False
     middle, wide = midpoint(value), radius(value)
@@ -100,15 +98,15 @@ def of_fraction(value: Fraction, kind: MetricKind = "error", words: str | None =
     return Metric(words or decimal_text(value, DIGITS), log10(value), kind)
 
 
-def larger(one: arb, other: arb) -> arb:
-    """The ball around the larger value: one of the two where they are apart, which spares FLINT's slower maximum."""
-    if one > other:
-        return one
-    return other if other > one else one.max(other)
+def larger(first: arb, second: arb) -> arb:
+    """The ball around the larger value: one of the two if they are disjoint, without FLINT's slower maximum."""
+    if first > second:
+        return first
+    return second if second > first else first.max(second)
 
 
 def root(value: arb) -> arb:
-    """√value of a ball around a number that is not negative, though the ball may reach below 0."""
+    """√value of a ball that encloses a nonnegative number, and may extend below 0."""
     return value.sqrt() if value >= 0 else value.abs_upper().sqrt().union(arb(0))
 
 
@@ -117,7 +115,7 @@ def largest(values: Iterable[arb]) -> arb:
     return reduce(larger, map(abs, values), _ZERO)
 
 
-# How many digits of a motion are right: one definition, for every table, page and document.
+# Correct digits of a motion: one definition for every table, page and document.
 
 
 RELATIVE = Quantity("solution_error", "relative", "max")
@@ -134,7 +132,7 @@ def relative_error(errors: Sequence[arb], truth: Sequence[arb]) -> arb:
 
 
 def digits_kept(row: Row) -> float | None:
-    """The digits of :func:`digits_right` to two places."""
+    """:func:`digits_right`, rounded to two decimals."""
     right = digits_right(row)
     return None if right is None else round(right, 2)
 
@@ -142,9 +140,9 @@ def digits_kept(row: Row) -> float | None:
 def digits_right(row: Row) -> float | None:
     """−log10 of the largest |error|/max(1, |true value|) over the samples and the components of Ω and γ.
 
-    At most the digits that the format has.  Where the reference does not resolve the error, the digits that are proven.
-    Of an ensemble: from the root mean square over its starts of each start's largest.
-    0 where an error is as large as the value, and where the format has lost all significant digits before the end.
+    At most the digits of the format.  If the reference does not resolve the error, the digits that are proven.
+    For an ensemble, from the root mean square over the starts of the maximum of each.
+    0 if an error is as large as the value, and if the format has lost all significant digits before the end.
     None without a reference, without a sample, and for a value that is not finite.
     """
     metric = row.metrics.get(RELATIVE.text)
@@ -152,12 +150,12 @@ def digits_right(row: Row) -> float | None:
         return None
     if row.reference.until:
         return 0.0
-    most = row.bits * math.log10(2)
-    return most if metric.size is None else min(most, max(0.0, -metric.size))
+    format_digits = row.bits * math.log10(2)
+    return format_digits if metric.size is None else min(format_digits, max(0.0, -metric.size))
 
 
 def digits_text(kept: float) -> str:
-    """Digits right, for people: to one place."""
+    """Digits right as text, with one decimal."""
     return f"{kept:.1f}"
 
 
@@ -166,25 +164,25 @@ def digits_of(bits: int) -> int:
     return round(bits * math.log10(2))
 
 
-# How many digits the states are written with, read off the numbers themselves.
+# The rounding of written states, inferred from the numbers themselves.
 
 
 _SPARE = 3
-"""Digits that the format must have beyond those written, or nothing was rounded."""
+"""A rounding is to at least so many digits fewer than the format has."""
 LEAST = 12
-"""Numbers that must agree."""
+"""The fewest numbers from which a rounding is inferred."""
 _SINGLE = 24
 _FINER = 2
-"""Digits of numbers of single precision, written as decimals, are finer than these by that factor."""
+"""Decimals of single-precision numbers are finer than single precision by at least this factor."""
 EXPLAINS = 1.5
-"""An error is that of rounding if it is at most so many times the largest rounding, ..."""
+"""An error is due to rounding if it is at most so many times the largest rounding error, ..."""
 _PART = 0.01
-"""... and at least that part of it: of a short number that is right nothing was rounded."""
+"""... and at least this fraction of it: an exact short number has not been rounded."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rounding:
-    """The rounding that all states have.
+    """A rounding common to all states.
 
     kind: "significant" digits, "decimals" after the point, or "single" precision.  digits: how many, 24 bits for the
     last.  error: the largest rounding of a component, relative to max(1, |value|).
@@ -195,7 +193,7 @@ class Rounding:
     error: float
 
     def spacing(self, values: NDArray[numpy.float64]) -> NDArray[numpy.float64]:
-        """Between neighbours of each value among the numbers that are so rounded."""
+        """The distance of neighbouring rounded numbers at each value."""
         if self.kind == "decimals":
             return numpy.full_like(values, 10.0**-self.digits)
         base = 2.0 if self.kind == "single" else 10.0
@@ -204,32 +202,32 @@ class Rounding:
 
 
 def roundings(states: Sequence[Sequence[Fraction]], precision: Precision, least: int = LEAST) -> list[Rounding]:
-    """Every rounding that all numbers have, the coarsest first; none where they are fewer than ``least``."""
+    """The roundings common to all numbers, the coarsest first; none for fewer numbers than ``least``."""
     numbers = [value for state in states for value in state if value]
-    return sorted(_all(numbers, precision), key=lambda rounding: -rounding.error) if len(numbers) >= least else []
+    return sorted(_roundings(numbers, precision), key=lambda r: -r.error) if len(numbers) >= least else []
 
 
 def explains(rounding: Rounding, error: float) -> bool:
-    """Whether an error, relative to max(1, |value|), is of the size that the rounding makes it."""
+    """Whether an error, relative to max(1, |value|), has the size of the rounding error."""
     return _PART * rounding.error <= error <= EXPLAINS * rounding.error
 
 
-def _all(numbers: Sequence[Fraction], precision: Precision) -> Iterator[Rounding]:
+def _roundings(numbers: Sequence[Fraction], precision: Precision) -> Iterator[Rounding]:
     worst = float(min(Fraction(1), max(map(abs, numbers))))
     written: list[Callable[[Fraction], Fraction]] = [lambda value: value]
     single = Rounding("single", _SINGLE, worst * 2.0**-_SINGLE)
-    forms: dict[str, tuple[Callable[..., Fraction], float]] = {
+    kinds: dict[str, tuple[Callable[..., Fraction], float]] = {
         "decimals": (lambda value, digits: Fraction(round(value * 10**digits), 10**digits), 0.5),
         "significant": (lambda value, digits: Fraction(decimal_text(value, digits)), 5 * worst),
     }
-    for kind, (form, scale) in forms.items():
+    for kind, (rounded_to, scale) in kinds.items():
         for digits in range(1, precision.digits - _SPARE):
-            if all(round_to(form(value, digits), precision.bits) == value for value in numbers):
+            if all(round_to(rounded_to(value, digits), precision.bits) == value for value in numbers):
                 rounding = Rounding(kind, digits, scale * 10.0**-digits)
                 yield rounding
-                written += [partial(form, digits=digits)] * (_FINER * rounding.error < single.error)
+                written += [partial(rounded_to, digits=digits)] * (_FINER * rounding.error < single.error)
                 break
-    for form_written in written if precision.bits > _SINGLE else ():
-        if all(round_to(form_written(round_to(value, _SINGLE)), precision.bits) == value for value in numbers):
+    for write in written if precision.bits > _SINGLE else ():
+        if all(round_to(write(round_to(value, _SINGLE)), precision.bits) == value for value in numbers):
             yield single
             break

@@ -1,10 +1,10 @@
-"""The reference of a row: the true motion of its rounded problem, proven where that is in reach, else computed.
+"""The reference of a row: the true motion of its rounded problem, proven if in reach, else computed.
 
-Proven: a closed form that a second source certifies, or the validated enclosure: up to |t| = 100 as far as that is in
-reach at all, beyond where the model of its cost stays below :data:`CHEAP`.  No clock is asked: the same plan gives the
-same bytes.  Computed: two runs in words with 30 bits more than the format, and 30 more again.  On a chaotic motion
-these lose what the format loses, so that they know the motion better as long as the format knows anything.  Where it
-has lost all significant digits the reference ends, and the time is named.
+Proven: a closed form that a second source certifies, or the validated enclosure; beyond |t| = 100 only if the model of
+its cost stays below :data:`CHEAP`.  No clock is read: a plan always gives the same bytes.  Computed: two multi-word
+runs with 30 and 60 bits more than the format.  On a chaotic motion they lose as many digits as the format, and so
+remain more accurate as long as the format has significant digits.  At the time at which it has lost all of them the
+reference ends.
 """
 
 from __future__ import annotations
@@ -33,46 +33,46 @@ from heavytop.records import Against, Certified
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import check_times
 
-# A reference where no proof is at hand: two runs in words of different length, trusted as far as they agree.
+# References without proof: two multi-word runs of different precision, valid to the digits that agree.
 #
-# Labelled computed, not proven: the radius is the difference of the two runs, which no theorem bounds.  The state is
-# that of the longer words, so the radius is the error of the shorter ones, and the state's own is smaller by as many
-# bits as the words differ by, on a chaotic motion too: what one loses the other loses.
+# Labelled computed, not proven: the radius is the difference of the two runs, which is no rigorous bound.  The state is
+# that of the finer run, so the radius is the error of the coarser one, and the error of the state is smaller by the
+# difference of their bits, on a chaotic motion too: both lose digits alike.
 
 
 MORE_BITS = 30
-"""The words of the second run have at least so many more bits than those of the first."""
+"""The second run has at least so many bits more than the first."""
 EFFORT = 60.0
-"""Seconds of the model of the cost that each run may take; absurd starts and times would never end."""
+"""The most seconds of a run, by the model of its cost; extreme starts and times would never end."""
 EFFORT_OF_MANY = 600.0
-"""Seconds for all the runs of an ensemble together."""
+"""The most seconds of all runs of an ensemble."""
 _PILOT_STEPS = 1000
-"""A run that takes more is forecast from so many: what would take longer than its effort is refused at once."""
+"""The cost of a longer run is extrapolated from so many steps, and one beyond its effort is refused."""
 _SEARCH = 8
 _WORD_BITS = 1032
 _DIGIT = 10
-"""An error leaves a digit where it is below the size of the state over this."""
+"""A state has a significant digit if its error is below its size over this."""
 _STAGES = 6
 _PROBES = 12
-"""A truth that may end is computed to the horizon over 4^6 first, and then to four times as far, until it has ended;
-where that is before the first sample, to the horizon over 4^12, so that nothing runs beyond the loss of all significant
+"""A reference that may end is computed to the horizon over 4^6 first, then four times as far, until it ends; if there
+is no sample so early, from the horizon over 4^12 on, so that no run continues far beyond the loss of all significant
 digits."""
 
 Given = Callable[[Precision], Problem]
-"""A motion to be computed, in any format."""
+"""The problem of a motion in a format."""
 
 
 def seconds_a_step(bits: int) -> float:
-    """A model of the cost of a step in so many bits, not a measurement: no result depends on a clock."""
+    """A model of the cost of a step with so many bits; no result depends on a clock."""
     return 3e-6 + 4e-12 * bits**3 if bits <= _WORD_BITS else 6e-8 * bits**2
 
 
 @dataclass(frozen=True, slots=True)
 class ComputedReference:
-    """States, with an attitude vector where the motion has one, at the times of two runs.
+    """States, with the attitude vector if the motion has one, at the times of two runs.
 
-    words: the bits of the words of both.  ends: the first time at which the format that is measured has lost all
-    significant digits; None where it keeps one to the last.
+    words: bits of both runs.  ends: the first time at which the measured format has lost all significant digits; None
+    if it has one to the end.
     """
 
     words: tuple[int, int]
@@ -81,11 +81,11 @@ class ComputedReference:
 
     @property
     def against(self) -> Against:
-        """Its kind, how far the runs agree as long as the format has digits, and how long that is."""
+        """The kind of the reference, the agreement of its runs, and its end."""
         return agreement([self])
 
     def state(self, time: Fraction, bits: int = 0) -> list[arb]:
-        """Six balls, or nine with the attitude vector, at one of the times; ``bits`` are what they are."""
+        """Six balls, or nine with the attitude vector, at one of the times; ``bits`` has no effect."""
         return self.balls[time]
 
     def radius(self, time: Fraction) -> Fraction:
@@ -93,11 +93,11 @@ class ComputedReference:
         return max(radius(value) / max(Fraction(1), abs(midpoint(value))) for value in self.balls[time])
 
     def blur(self, time: Fraction) -> float:
-        """How far the state at one of the times may be off, absolute."""
+        """The absolute uncertainty of the state at one of the times."""
         return float(sum(map(radius, self.balls[time])))
 
     def beyond(self, part: Fraction) -> set[Fraction]:
-        """The times at which Ω or γ is uncertain by more than this part of the largest that it becomes."""
+        """The times at which the radius of Ω or γ exceeds this fraction of its maximum."""
         uncertain: set[Fraction] = set()
         for group in (slice(0, 3), slice(3, 6)):
             largest = max(abs(midpoint(value)) for state in self.balls.values() for value in state[group])
@@ -106,7 +106,7 @@ class ComputedReference:
 
 
 def agreement(references: Sequence[ComputedReference]) -> Against:
-    """The kind of the references of one ensemble, all over the same times."""
+    """The kind, agreement and end of the references of an ensemble, all over the same times."""
     (coarse, fine), ends = references[0].words, references[0].ends
     radii = [motion.radius(t) for motion in references for t in motion.balls if ends is None or abs(t) < abs(ends)]
     agreed = radius_text(max(radii)) if radii else ""
@@ -117,10 +117,10 @@ def agreement(references: Sequence[ComputedReference]) -> Against:
 def of_rounded(
     problems: Sequence[Problem], times: Sequence[Fraction], least: int = 0, effort: float | None = None
 ) -> list[ComputedReference]:
-    """The motions of problems of one format, from the very numbers that they are, in 30 bits more and 60 more.
+    """References of problems of one format, from their rounded data, with 30 and 60 bits more.
 
-    least: bits of the first run at least.  effort: as in :func:`compute`.
-    All end where one has lost all significant digits of the format, as laws of growth do.
+    least: the fewest bits of the first run.  effort: as in :func:`compute`.
+    All end where one has lost all significant digits of the format, as growth laws do.
     Raises OutOfReach as :func:`compute` does, and InputError for more bits than there are.
     """
     bits = problems[0].precision.bits
@@ -139,24 +139,24 @@ def compute(
     format_bits: int | None = None,
     effort: float | None = None,
 ) -> list[ComputedReference]:
-    """The motions at ``times``, from runs in about ``bits`` bits and in at least :data:`MORE_BITS` more.
+    """References at ``times``, from runs with about ``bits`` bits and with at least :data:`MORE_BITS` more.
 
     times: as for :func:`heavytop.integrate.multiword.motions.propagate_multiword`.
-    format_bits: those of the format that is measured, in which the motions may lose all digits; None for no format.
-    effort: seconds of the model of the cost that each run may take; None for 60, or the 600 of an ensemble shared out.
+    format_bits: those of the measured format, in which motions may lose all digits; None for no format.
+    effort: seconds of each run, by the model of its cost; None for 60, or an equal share of 600 for an ensemble.
     Raises OutOfReach if a run does not reach the last time within the effort.
     """
-    first = [_Served.of(problem, bits) for problem in problems]
+    first = [_WithArithmetic.of(problem, bits) for problem in problems]
     finer = _finer(problems, bits, first)
-    second = [_Served.of(problem, finer) for problem in problems]
+    second = [_WithArithmetic.of(problem, finer) for problem in problems]
     words = [(one.bits, two.bits) for one, two in zip(first, second, strict=True)]
     balls: list[dict[Fraction, list[arb]]] = [{} for _ in problems]
     seconds = effort or (EFFORT if len(problems) == 1 else EFFORT_OF_MANY / len(problems))
     for early in _stages(times, _STAGES if format_bits is not None else 0):
-        # no bit of a run depends on the samples taken: what a shorter stage had is not taken again
+        # no bit of a run depends on its samples: those of shorter stages are not computed again
         more = [time for time in early if time not in balls[0]]
         for index, pair in enumerate(zip(_states(first, more, seconds), _states(second, more, seconds), strict=True)):
-            known = balls[index] | dict(zip(more, _around(*pair, bits), strict=True))
+            known = balls[index] | dict(zip(more, _balls(*pair, bits), strict=True))
             balls[index] = {time: known[time] for time in early}
         references = [ComputedReference(*pair) for pair in zip(words, balls, strict=True)]
         ends = (
@@ -165,7 +165,7 @@ def compute(
             else _last_digit(references, [served.accuracy - format_bits for served in first])
         )
         if ends is not None and ends not in times:
-            # lost on the way to the first sample
+            # lost before the first sample
             return [ComputedReference(words, {}, times[0]) for words in words]
         if ends is not None:
             break
@@ -173,10 +173,10 @@ def compute(
 
 
 @dataclass(frozen=True, slots=True)
-class _Served:
-    """A motion in a format, and the words that serve it.
+class _WithArithmetic:
+    """A motion in a format, with its arithmetic.
 
-    bits: of the words.  accuracy: as in :func:`heavytop.integrate.multiword.engines.accuracy`.
+    bits: of the arithmetic.  accuracy: as in :func:`heavytop.integrate.multiword.engines.accuracy`.
     """
 
     problem: Problem
@@ -184,7 +184,7 @@ class _Served:
     accuracy: int
 
     @classmethod
-    def of(cls, request: Given, bits: int) -> _Served:
+    def of(cls, request: Given, bits: int) -> _WithArithmetic:
         from heavytop.integrate.multiword.engines import accuracy, choose  # a proven reference needs no integrator
 
         problem = request(real(bits))
@@ -192,20 +192,20 @@ class _Served:
         return cls(problem, int(arithmetic.flags["bits"]), accuracy(arithmetic, scaled))
 
 
-def _finer(problems: Sequence[Given], bits: int, first: Sequence[_Served]) -> int:
-    """The bits of a second format, whose words have 30 bits more at least.
+def _finer(problems: Sequence[Given], bits: int, first: Sequence[_WithArithmetic]) -> int:
+    """The bits of a second format, whose arithmetic has at least 30 bits more than that of ``first``.
 
-    Two formats may be served by the same words, and then differ by nothing.
+    Two formats may have the same arithmetic.
     """
     finer = bits + MORE_BITS
-    for problem, one in zip(problems, first, strict=True):
-        while _Served.of(problem, finer).bits < one.bits + MORE_BITS:
+    for problem, coarse in zip(problems, first, strict=True):
+        while _WithArithmetic.of(problem, finer).bits < coarse.bits + MORE_BITS:
             finer += _SEARCH
     return finer
 
 
 def _stages(times: Sequence[Fraction], stages: int) -> list[Sequence[Fraction]]:
-    """Times within the horizon over 4^n, each list longer than the one before; without any, its end."""
+    """The times within the horizon over 4^n, in lists of increasing length; without any, that end alone."""
     ends = {n: times[-1] / 4**n for n in range(_PROBES if stages else 0, -1, -1)}
     counts = {n: sum(abs(time) <= abs(end) for time in times) for n, end in ends.items()}
     before = [[ends[n]] for n, count in counts.items() if not count]
@@ -213,10 +213,10 @@ def _stages(times: Sequence[Fraction], stages: int) -> list[Sequence[Fraction]]:
 
 
 def _last_digit(references: Sequence[ComputedReference], fewer: Sequence[int]) -> Fraction | None:
-    """The first time at which some motion has lost all significant digits in a format of so many bits ``fewer`` than
-    the words have.
+    """The first time at which some motion has lost all significant digits of the format, with ``fewer`` bits than its
+    run.
 
-    Its error is that of the shorter words, times 2 to as many bits: both are amplified alike.
+    The error in the format is that of the coarser run times 2^fewer: both are amplified alike.
     """
     lost = [
         reference.beyond(Fraction(1, _DIGIT) / 2 ** max(0, bits))
@@ -225,12 +225,12 @@ def _last_digit(references: Sequence[ComputedReference], fewer: Sequence[int]) -
     return next((time for time in references[0].balls if any(time in reference for reference in lost)), None)
 
 
-def _states(served: Sequence[_Served], times: Sequence[Fraction], effort: float) -> list[Sequence[Any]]:
+def _states(served: Sequence[_WithArithmetic], times: Sequence[Fraction], effort: float) -> list[Sequence[Any]]:
     """The states of each motion at ``times``."""
     problems = [served.problem for served in served]
     words = max(served.bits for served in served)
     limit = int(effort / seconds_a_step(words))
-    runs = _followed(problems, times, min(limit, _PILOT_STEPS))
+    runs = _trajectories(problems, times, min(limit, _PILOT_STEPS))
     states: list[Sequence[Any]] = [run.states for run in runs]
     if limit > _PILOT_STEPS and any(run.outcome is Outcome.STEP_LIMIT for run in runs):
         reached = min(abs(run.time_reached) for run in runs if run.outcome is Outcome.STEP_LIMIT)
@@ -241,7 +241,7 @@ def _states(served: Sequence[_Served], times: Sequence[Fraction], effort: float)
                 "Ask for an earlier time.",
             )
         done = min(map(len, states))
-        runs = _followed(problems, times[done:], limit)
+        runs = _trajectories(problems, times[done:], limit)
         states = [[*before[:done], *run.states] for before, run in zip(states, runs, strict=True)]
     for run in runs:
         if run.outcome is not Outcome.SUCCESS:
@@ -251,8 +251,8 @@ def _states(served: Sequence[_Served], times: Sequence[Fraction], effort: float)
     return states
 
 
-def _followed(problems: Sequence[Problem], times: Sequence[Fraction], limit: int) -> list[Trajectory]:
-    """In words; one by itself is not put into lanes."""
+def _trajectories(problems: Sequence[Problem], times: Sequence[Fraction], limit: int) -> list[Trajectory]:
+    """Multi-word trajectories, in lanes if there are several."""
     from heavytop.integrate.multiword.lanes import propagate_multiword_ensemble
     from heavytop.integrate.multiword.motions import integrate_to_samples
 
@@ -263,30 +263,30 @@ def _followed(problems: Sequence[Problem], times: Sequence[Fraction], limit: int
 
 
 @whole_evaluation
-def _around(coarse: Sequence[Any], fine: Sequence[Any], bits: int) -> list[list[arb]]:
-    """The finer values; the radius of Ω, γ and ξ is the largest difference in it, and a rounding of the coarser."""
+def _balls(coarse: Sequence[Any], fine: Sequence[Any], bits: int) -> list[list[arb]]:
+    """Balls around the finer values; the radius of each vector is its largest difference plus a coarser rounding."""
     with working_precision(bits + 128):
-        return [_group_balls(one, two, bits) for one, two in zip(coarse, fine, strict=True)]
+        return [_balls_by_vector(one, two, bits) for one, two in zip(coarse, fine, strict=True)]
 
 
-def _group_balls(coarse: Sequence[Any], fine: Sequence[Any], bits: int) -> list[arb]:
-    one, two = to_balls(coarse), to_balls(fine)
+def _balls_by_vector(coarse: Sequence[Any], fine: Sequence[Any], bits: int) -> list[arb]:
+    low, high = to_balls(coarse), to_balls(fine)
     balls: list[arb] = []
-    for k in range(0, len(one), 3):
-        group = two[k : k + 3]
-        apart = largest([b - a for a, b in zip(one[k : k + 3], group, strict=True)])
-        apart += largest(group) * arb(2) ** -bits
-        balls += [value + arb(0, apart.abs_upper()) for value in group]
+    for k in range(0, len(low), 3):
+        group = high[k : k + 3]
+        difference = largest([b - a for a, b in zip(low[k : k + 3], group, strict=True)])
+        difference += largest(group) * arb(2) ** -bits
+        balls += [value + arb(0, difference.abs_upper()) for value in group]
     return balls
 
 
 CHEAP = 1.0
-"""Seconds of the model of the cost that the enclosure of a row may take beyond |t| = 100."""
+"""The most seconds of the enclosure of a row beyond |t| = 100, by the model of its cost."""
 _ALWAYS_ENCLOSED = 100
 _DIGITS_A_BIT = Fraction(30103, 100000)
 _SPARE_DIGITS = 3
 _EFFORT = 1.0
-"""Seconds that a second source at the horizon itself may cost; beyond, it is compared near 0 and near the horizon."""
+"""The most seconds of a second source at the horizon; else the sources are compared near 0 and near the horizon."""
 _SHARED_STATES, _SHARED_BITS = 1024, 64
 
 Evaluate = Callable[[Fraction, int], Sequence[arb]]
@@ -294,11 +294,11 @@ Evaluate = Callable[[Fraction, int], Sequence[arb]]
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """The states that a run is compared with.
+    """The reference states of a run.
 
-    against: how they are known, for the row.  state: six balls at (time, bits).
-    ends: the first time at which the format has lost all significant digits, and from which on there are no states;
-    None where it keeps one to the last.
+    against: their kind, for the row.  state: (time, bits) -> six balls.
+    ends: the first time at which the format has lost all significant digits; there are no states from there on.  None
+    if it has one to the end.
     """
 
     against: Against
@@ -306,11 +306,11 @@ class Truth:
     ends: Fraction | None = None
 
     def covers(self, time: Fraction) -> bool:
-        """Whether there is a state at that time."""
+        """Whether there is a state at ``time``."""
         return self.ends is None or abs(time) < abs(self.ends)
 
     def remembered(self) -> Truth:
-        """This truth with each state worked out once: for several runs over the same times."""
+        """The reference with a cache of its states, for several runs over the same times."""
         return replace(self, state=cache(self.state))
 
 
@@ -325,7 +325,7 @@ class Known:
 
     @property
     def certified(self) -> Certified:
-        """Time, digits and second source."""
+        """The certificate as a record of the row."""
         c = self.certificate
         return Certified(
             shown(self.time), None if c.agreed_digits >= EXACTLY else c.agreed_digits, c.second_source, c.kind
@@ -333,32 +333,32 @@ class Known:
 
     @property
     def against(self) -> Against:
-        """Method, radius and certificate, for the row."""
+        """Method, radius and certificate as a record of the row."""
         limit = radius_text(Fraction(1, 2**self.bits))
         return Against("proven", self.certificate.method, limit, (self.certified,))
 
     @property
     def truth(self) -> Truth:
-        """For a scorer."""
-        enclosed = isinstance(self.solution, Validated)  # more bits than asked for are another run
+        """The reference states."""
+        enclosed = isinstance(self.solution, Validated)  # further bits need another run
         return Truth(self.against, self.solution.state if enclosed else states_of(self.solution))
 
 
 def truth(problem: Problem, times: Sequence[Fraction], effort: float | None = None) -> Truth | str:
-    """The true motion of a rounded problem at ``times``, exact numbers in the order of a run; why not, where it is
+    """The true motion of a rounded problem at ``times``, exact numbers in the order of a run, or the reason why it is
     neither proven nor computed.
 
-    Of a problem with ξ nine balls a time: Ω, γ and the ξ that begins at that of the problem.
-    effort: of a computed one, :func:`heavytop.measure.truth.compute`.
-    Raises Contradiction where a second source excludes a proven one: then something is wrong with this program.
+    The states of a problem with ξ are nine balls: Ω, γ, and ξ from the initial ξ of the problem.
+    effort: as in :func:`heavytop.measure.truth.compute`.
+    Raises Contradiction if a second source excludes a proven one, which is an error of this program.
     """
     horizon = max(times, key=abs)
     known = known_motion(replace(problem, xi=None), horizon)
     if isinstance(known, Known):
         if problem.xi is None:
             return known.truth
-        if (nine := _nine(known.solution, problem, horizon)) is not None:
-            return Truth(known.against, nine)
+        if (with_attitude := _with_attitude(known.solution, problem, horizon)) is not None:
+            return Truth(known.against, with_attitude)
     computed = _computed(problem, times, effort)
     if isinstance(known, Known):
         return computed
@@ -368,7 +368,7 @@ def truth(problem: Problem, times: Sequence[Fraction], effort: float | None = No
 
 
 def uncertified(problem: Problem, times: Sequence[Fraction]) -> Truth | str:
-    """A truth for the scatter of runs that differ in their roundings alone: no second source is asked."""
+    """A reference for the scatter of runs that differ in their roundings alone, without a second source."""
     form = closed_form(problem)
     return _computed(problem, times) if form is None else Truth(Against("proven", form.method), states_of(form))
 
@@ -384,15 +384,14 @@ def _computed(problem: Problem, times: Sequence[Fraction], effort: float | None 
 
 
 def clause(error: HeavyTopError) -> str:
-    """Its cause inside a sentence."""
+    """The cause of an error as a clause."""
     return error.cause[:1].lower() + error.cause[1:].removesuffix(".")
 
 
 def certified(solution: ExactSolution, time: Fraction, bits: int) -> Known | None:
-    """``solution`` for references of ``bits`` bits, if it is certified to more digits than its format has at ``time``.
+    """``solution`` for references of ``bits`` bits, or None unless it is certified to more digits than the format has.
 
-    None if not: a reference below its certified digits scores nothing.  Raises Contradiction where the second source
-    excludes it.
+    Raises Contradiction if the second source excludes it.
     """
     digits = int(bits * _DIGITS_A_BIT)
     certificate = certify(solution, time, digits, enclosure=_enclosure(solution))
@@ -402,32 +401,32 @@ def certified(solution: ExactSolution, time: Fraction, bits: int) -> Known | Non
 
 @lru_cache(maxsize=8)
 def _enclosure(solution: ExactSolution) -> Validated:
-    """The second source of a motion, whose pilots rows of several formats share."""
+    """The second source of a motion; rows of several formats share its pilots."""
     return enclosure_of(solution, effort=_EFFORT)
 
 
 @lru_cache(maxsize=8)
 def closed_form(problem: Problem) -> ExactSolution | None:
-    """The closed form of a rounded problem, if it has one here; the same for rows one after another of one problem."""
+    """The closed form of a rounded problem, or None; consecutive rows of a problem share it."""
     if problem.system is GYROSTAT:
-        # rounded, γ is no longer parallel to M: the rotor is that of the exact data
+        # rounded γ is not parallel to M: the rotor is that of the exact data
         return Gyrostat(problem.top, problem.start, problem.parameters.rotor)
     return next(matches(problem.top, problem.start, problem.system), None)
 
 
 @lru_cache(maxsize=16)
 def states_of(solution: ExactSolution) -> Evaluate:
-    """The states of a motion, which rows and reruns share, also of formats between the same multiples of 64 bits."""
+    """The states of a motion, cached for rows and reruns; bits are rounded up to a multiple of 64."""
     states = lru_cache(maxsize=_SHARED_STATES)(solution.state)
     return lambda time, bits: states(time, -(-bits // _SHARED_BITS) * _SHARED_BITS)
 
 
 @lru_cache(maxsize=32)
 def known_motion(problem: Problem, horizon: Fraction) -> Known | str:
-    """The closed form of a rounded problem, or its enclosure where that is cheap; why not, where there is neither.
+    """The closed form of a rounded problem, or its enclosure if that is cheap, or the reason why there is neither.
 
-    Certified at ``horizon`` for the bits of the format and its guard bits.  Raises Contradiction where the second
-    source excludes it.
+    Certified at ``horizon`` for the bits of the format and its guard bits.  Raises Contradiction if the second source
+    excludes it.
     """
     bits = problem.precision.bits + GUARD_BITS
     try:
@@ -442,13 +441,13 @@ def known_motion(problem: Problem, horizon: Fraction) -> Known | str:
     return known or "certified to fewer digits than the format has"
 
 
-# The attitude vector of a known motion, from that which the problem begins with.
+# The attitude vector of a known motion, from the initial one of the problem.
 
 
-def _nine(solution: ExactSolution, problem: Problem, horizon: Fraction) -> Evaluate | None:
-    """Ω, γ and ξ of a known motion: ξ by its closed form where that reaches the horizon, else by the enclosure.
+def _with_attitude(solution: ExactSolution, problem: Problem, horizon: Fraction) -> Evaluate | None:
+    """Ω, γ and ξ of a known motion: ξ by its closed form if that reaches the horizon, else by the enclosure.
 
-    None where neither does.
+    None if neither does.
     """
     bits = problem.precision.bits + GUARD_BITS
     xi = problem.xi
@@ -465,19 +464,19 @@ def _nine(solution: ExactSolution, problem: Problem, horizon: Fraction) -> Evalu
     return evaluate
 
 
-# What the motions of an ensemble are compared with: closed forms, else runs in more bits.
+# References of ensembles: closed forms, else runs with more bits.
 
 
 _CERTIFIED_AT = Fraction(2)
-"""|t| at which the closed form of every start is certified; that of the first start is at the horizon too."""
+"""|t| at which the closed form of each start is certified; that of the first also at the horizon."""
 _TOO_FEW = "the closed form is certified to too few digits"
 
 
 @dataclass(frozen=True, slots=True)
 class EnsembleReference:
-    """The references of an ensemble: the truth of each start, or why it is missing.
+    """The references of an ensemble: that of each start, or the reason why there is none.
 
-    blur: how far each state may be off, absolute, for each start and time that is covered; shape (starts, samples).
+    blur: absolute uncertainties of the states, for each start and covered time; shape (starts, samples).
     """
 
     against: Against
@@ -486,22 +485,21 @@ class EnsembleReference:
 
     @property
     def samples(self) -> int:
-        """How many of the times are covered."""
+        """The number of covered times."""
         return max(map(len, self.blur), default=0)
 
 
 @lru_cache(maxsize=2)
 def reference(problems: tuple[Problem, ...], times: tuple[Fraction, ...], least: int = 0) -> EnsembleReference:
-    """The closed forms where there are any, else runs in 30 bits more, or in ``least`` bits where that is more.
+    """The closed forms if all problems have one, else runs with 30 bits more, or ``least`` bits if that is more.
 
-    The rows of a plan that differ in flags share it, and every state that was worked out; so do problems that are one
-    motion.
+    Rows of a plan that differ in flags share it with its cached states; so do problems of one motion.
     """
-    of: dict[Any, ExactSolution | None] = {}
+    form_of: dict[Any, ExactSolution | None] = {}
     for problem in problems:
-        if (motion := _motion(problem)) not in of:
-            of[motion] = closed_form(problem)
-    forms = [form for problem in problems if (form := of[_motion(problem)]) is not None]
+        if (motion := _motion(problem)) not in form_of:
+            form_of[motion] = closed_form(problem)
+    forms = [form for problem in problems if (form := form_of[_motion(problem)]) is not None]
     if len(forms) == len(problems):
         return _certified(forms, times, problems[0].precision.bits + GUARD_BITS)
     try:
@@ -517,11 +515,11 @@ def reference(problems: tuple[Problem, ...], times: tuple[Fraction, ...], least:
 
 
 def _motion(problem: Problem) -> tuple[Any, ...]:
-    """The data on which the motion depends: inertia and weight times a common factor are the same motion."""
+    """The data on which the motion depends, independent of a common factor of inertia and weight."""
     p = problem.parameters
-    own = p.mapped(lambda value: value / p.inertia[0])
-    rotor = p.rotors if problem.system is GYROSTAT else own.rotors
-    return problem.system.name, *own.inertia, *own.moment, *rotor, problem.start
+    ratios = p.mapped(lambda value: value / p.inertia[0])
+    rotor = p.rotors if problem.system is GYROSTAT else ratios.rotors
+    return problem.system.name, *ratios.inertia, *ratios.moment, *rotor, problem.start
 
 
 def _none(starts: int, reason: str) -> EnsembleReference:
@@ -529,16 +527,16 @@ def _none(starts: int, reason: str) -> EnsembleReference:
 
 
 def _certified(forms: Sequence[ExactSolution], times: Sequence[Fraction], bits: int) -> EnsembleReference:
-    """Every closed form certified early, and the first at the horizon too."""
+    """The closed forms, each certified early, and the first also at the horizon."""
     horizon = times[-1]
     early = min(_CERTIFIED_AT, abs(horizon)) * (1 if horizon > 0 else -1)
     proofs = {id(form): _proof(form, early, bits) for form in forms}
     last = _proof(forms[0], horizon, bits)
-    done = [proof for proof in proofs.values() if proof]
-    if not done or last is None:
+    proven = [proof for proof in proofs.values() if proof]
+    if not proven or last is None:
         return _none(len(forms), _TOO_FEW)
-    least = min(done, key=lambda proof: proof.certificate.agreed_digits).certified
-    by = done[0].certificate
+    least = min(proven, key=lambda proof: proof.certificate.agreed_digits).certified
+    by = proven[0].certificate
     starts = sum(proofs[id(form)] is not None for form in forms)
     every = replace_struct(least, source=by.second_source, proven=by.kind, starts=starts, of_starts=len(forms))
     against = replace_struct(last.against, certificates=(last.certified, every))
