@@ -27,7 +27,7 @@ _DIGITS = 40
 
 
 def case_data(case: Case) -> dict[str, Any]:
-    """Exact data as text, by the keys of a trajectory file; of a named body as it was given."""
+    """Exact data as text, by the keys of a trajectory file; a named body in its original axes."""
     head = {"name": case.name, "system": case.system.name}
     if case.body is None or case.given_start is None:
         return head | data_texts(case.top, case.start)
@@ -39,12 +39,12 @@ def case_data(case: Case) -> dict[str, Any]:
 
 
 def _in_decimals(text: str) -> str:
-    """A text whose quotients are decimals where they end: the data of other programs are."""
+    """The text with each fraction that is a finite decimal written as one, as other programs write their data."""
 
     def decimal(match: re.Match[str]) -> str:
-        below = int(match[2])
-        places = next((n for n in range(_PLACES) if 10**n % below == 0), None)
-        return match[0] if places is None else f"{Decimal(int(match[1]) * 10**places // below).scaleb(-places):f}"
+        denominator = int(match[2])
+        places = next((n for n in range(_PLACES) if 10**n % denominator == 0), None)
+        return match[0] if places is None else f"{Decimal(int(match[1]) * 10**places // denominator).scaleb(-places):f}"
 
     return re.sub(r"(?<![\w/.])(-?\d+)/(\d+)(?![\w/.])", decimal, text)
 
@@ -62,20 +62,20 @@ def forms(case: Case) -> dict[str, str]:
 def rerun(
     case: Case, times: Sequence[Fraction], precision: str, integrator: str, tolerance: str = "", reached: bool = True
 ) -> str:
-    """The command that measures a motion again: its digits right, or how the run ends where it has not ``reached``."""
+    """The command that repeats one measurement: digits right, or where it has not ``reached`` the run's outcome."""
     line = f"{forms(case)['command'].rpartition(' --times ')[0]} --times {','.join(map(time_text, times))}"
     line += "" if precision == DOUBLE.name else f" --precision {precision}"
     line += f" --integrator {quote(integrator)}" + (f" --tolerance {tolerance}" if tolerance else "")
     return f"{line} --json | heavytop score -" if reached else line
 
 
-def _follows(data: dict[str, Any]) -> bool:
-    """Whether the system need not be said: it is that of a top with these data."""
+def _is_default_system(data: dict[str, Any]) -> bool:
+    """Whether the system is the default of a top with these data, and is not written."""
     return bool(data["system"] == ("heavy_gyrostat" if "rotor" in data else "heavy_top"))
 
 
 def _command(data: dict[str, Any]) -> str:
-    system = "" if _follows(data) else f" --system {data['system']}"
+    system = "" if _is_default_system(data) else f" --system {data['system']}"
     keys = ("inertia", "weight", "centre", "rotor", "omega", "gamma")
     options = " ".join(f"--{key} {_joined(data[key])}" for key in keys if key in data)
     return f"heavytop propagate {options}{system} --times {','.join(_TIMES)}"
@@ -92,17 +92,17 @@ def _csv(data: dict[str, Any]) -> str:
 
 def _toml(data: dict[str, Any]) -> str:
     # a plan's own top may not have the name of a case
-    named = {key: value for key, value in data.items() if not key.startswith("start_")}
-    named |= {"name": f"my-{data['name']}"}
+    entries = {key: value for key, value in data.items() if not key.startswith("start_")}
+    entries |= {"name": f"my-{data['name']}"}
     kind, _, angles = data.get("start_attitude", "").partition(" ")
     if kind == "axis_angle":
         angles = ":".join(angles.rsplit(",", 1))
     attitude = {key: data.get(f"start_{key}") for key in ("quaternion", "matrix")} if not kind else {kind: angles}
     attitude = {key: value for key, value in attitude.items() if value}
     if attitude:
-        named.pop("gamma")
-    named |= attitude
-    return "\n".join(["[[top]]", *(f"{key} = {json.dumps(value)}" for key, value in named.items())])
+        entries.pop("gamma")
+    entries |= attitude
+    return "\n".join(["[[top]]", *(f"{key} = {json.dumps(value)}" for key, value in entries.items())])
 
 
 def _json(data: dict[str, Any]) -> str:
@@ -118,7 +118,7 @@ def _python(data: dict[str, Any]) -> str:
         return f"({', '.join(map(number, data[key]))})"
 
     weight = number(data["weight"])
-    system = "" if _follows(data) else f', system="{data["system"]}"'
+    system = "" if _is_default_system(data) else f', system="{data["system"]}"'
     rotor = f", rotor={numbers('rotor')}" if "rotor" in data else ""
     return "\n".join(
         [
@@ -136,26 +136,26 @@ def _python_of_body(case: Case) -> str:
     spin = ("omega", start.omega) if start.omega_space is None else ("omega_space", start.omega_space)
     parts = [spin, ("gamma", start.gamma)] if start.attitude is None else [spin]
     vectors = [f"{name}=({', '.join(repr(exact_text(value)) for value in vector)})" for name, vector in parts]
-    rest = [] if start.attitude is None else [f"attitude=ht.{start.attitude!r}"]
+    attitude = [] if start.attitude is None else [f"attitude=ht.{start.attitude!r}"]
     return "\n".join(
         [
             "import heavytop as ht",
             "",
             f"body = ht.{case.body!r}",
-            f"start = ht.State({', '.join(vectors + rest)})",
+            f"start = ht.State({', '.join(vectors + attitude)})",
             f"run = ht.propagate(body, start, [{', '.join(_TIMES)}], ht.DOUBLE)",
             "run.quaternions(), run.positions()",
         ]
     )
 
 
-# The members of an ensemble: random starts of a top, or one motion with other roundings.
+# The members of an ensemble: random starts of a top, or one motion with perturbed roundings.
 
 
 _GRID = 1000
 _GAMMA_BITS = 24
-_APART = 64
-"""Roundings of one seed are so many rows of a report apart from those of the next."""
+_SEED_STRIDE = 64
+"""Offset between the rounding factors of one seed and of the next."""
 
 
 Member = tuple[HeavyTop, State]
@@ -164,22 +164,22 @@ Member = tuple[HeavyTop, State]
 def ensemble_of(case: Case, count: int, seed: int) -> list[Member]:
     """``count`` tops with starts; growing ``count`` keeps the earlier ones.
 
-    Where random starts of the top are known in the same way as the case, these, of the one top: Ω has components
+    Random starts of the top where they have a closed form of the same class as the case: the components of Ω are
     uniform up to the largest of the case's Ω, and γ is a rational point of the unit sphere, uniform over it; for the
-    gyrostat γ is M/|M| and |M| is half to three halves of the case's.
-    A case that is one motion of its top, such as a pendulum, is taken with as many other roundings
-    (:mod:`heavytop.measure.rounding_noise`); raises InputError where there are not as many.
+    gyrostat γ is M/|M|, and |M| is from 1/2 to 3/2 of the case's.
+    Else, as for a pendulum, the case itself with ``count`` perturbed roundings
+    (:mod:`heavytop.measure.rounding_noise`); raises InputError where there are fewer.
     """
     if one_motion(case, seed):
         if count > FACTORS:
             raise InputError(f"{count} starts of {case.name}, which is one motion.", f"Give up to {FACTORS}.")
-        return [(scaled(case.top, factor(_APART * seed, index)), case.start) for index in range(count)]
+        return [(scaled(case.top, factor(_SEED_STRIDE * seed, index)), case.start) for index in range(count)]
     return [(case.top, _draw(case, seed, index)) for index in range(count)]
 
 
 def one_motion(case: Case, seed: int) -> bool:
-    """Whether the case is one special motion of its top, not of a class that random starts are of."""
-    return case.homoclinic is not None or _kind(case, case.start) is not _kind(case, _draw(case, seed, 0))
+    """Whether the case is a special motion of its top, of a class to which random starts do not belong."""
+    return case.homoclinic is not None or _class_of(case, case.start) is not _class_of(case, _draw(case, seed, 0))
 
 
 def _draw(case: Case, seed: int, index: int) -> State:
@@ -197,7 +197,7 @@ def _draw(case: Case, seed: int, index: int) -> State:
     return State([size * Fraction(random.randint(-_GRID, _GRID), _GRID) for _ in range(3)], gamma)
 
 
-def _kind(case: Case, start: State) -> type | None:
-    """The closed form that a random start of the top has as well, or the special one it lacks."""
+def _class_of(case: Case, start: State) -> type | None:
+    """The class of the closed form of a start; None without one."""
     solution = next(matches(case.top, start, case.system), None)
     return None if solution is None else type(solution)

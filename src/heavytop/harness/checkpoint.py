@@ -1,8 +1,8 @@
-"""The files of a run while it goes on, so that `run --resume` measures nothing twice.
+"""Checkpoint files of a run in progress, so that `run --resume` measures nothing twice.
 
-DIR/rows.jsonl: a first line that names plan and program, then one line a row, each with its checksum.  A line that a
-kill cut short is measured again.  DIR/row-N.partial: the place of a long row in progress.  All is text; nothing is
-ever unpickled.
+DIR/rows.jsonl: a first line that names plan and program, then one line per row, each with its checksum.  The row of a
+truncated line is measured again.  DIR/row-N.partial: the resume point of a long row in progress.  All is text; nothing
+is ever unpickled.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ if TYPE_CHECKING:
 
 FILE = "rows.jsonl"
 OURS = re.compile(r"rows\.jsonl|row-\d+\.partial|\.lock|\..*\.partial")
-"""Names of what a run leaves behind when it is killed."""
+"""Names of the files that a killed run leaves behind."""
 EVERY = 10.0
-"""Seconds between two places of a row in progress."""
+"""Seconds between two resume points of a row in progress."""
 _WAIT = 0.2
-"""Seconds that a run waits for the lock: another may be removing its own just now."""
+"""Seconds that a run waits for the lock: another run may be about to release it."""
 _SYNC_EVERY = 1.0
-"""Seconds of finished rows that a power cut may cost.  A kill costs none."""
+"""Seconds of finished rows that a power failure may lose.  A kill loses none."""
 
 
 class Saved:
-    """The place of one row in progress, in a file of its own; nowhere where ``path`` is None.
+    """The resume point of one row in progress, in a file of its own; without ``path`` nothing is saved.
 
-    A measurement asks :meth:`load` once, and where :meth:`due` says so hands plain text and integers to :meth:`save`.
-    taken: whether something was loaded.
+    A measurement calls :meth:`load` once, and where :meth:`due` holds passes plain text and integers to :meth:`save`.
+    taken: whether a resume point was loaded.
     """
 
     def __init__(self, path: Path | None = None, identity: str = "", every: float = EVERY) -> None:
@@ -53,15 +53,15 @@ class Saved:
         self._last = monotonic()
 
     def forget(self) -> None:
-        """Drop what was saved before: nothing is loaded any more, and the next save replaces it."""
+        """Delete the resume point, so that the row is measured from the beginning."""
         self.taken = False
         if self.path is not None:
             self.path.unlink(missing_ok=True)
 
     def load(self) -> dict[str, Any] | None:
-        """The content saved last by the same plan and program; None where absent.
+        """The content last saved by the same plan and program; None where absent.
 
-        Its checksum is right, but not that of a secret: anything may stand in it.
+        The checksum detects damage, not forgery: the content is untrusted.
         """
         if self.path is None or not self.path.exists():
             return None
@@ -75,21 +75,21 @@ class Saved:
         return None
 
     def due(self) -> bool:
-        """Whether the last save is long enough ago.  No result depends on it."""
+        """Whether the last save was at least ``every`` seconds ago.  No result depends on it."""
         return self.path is not None and monotonic() - self._last >= self.every
 
     def save(self, content: dict[str, Any]) -> None:
-        """Keep this in the place of what was saved before."""
+        """Replace the saved content."""
         assert self.path is not None
         replace(self.path, [line(msgspec.json.encode((self.identity, content)))])
         self._last = monotonic()
 
 
 class Checkpoint:
-    """The rows of one run directory, kept on disk; a lock lets only one run write there.
+    """The rows of one run directory, stored on disk; a lock lets only one run write there.
 
-    identity: what must be the same for a run to go on.  check: called with the lock held, before anything is read; it
-    raises InputError where the directory is not fit.
+    identity: must be equal for a run to be resumed.  check: called with the lock held, before anything is read; raises
+    InputError for an unsuitable directory.
     """
 
     def __init__(
@@ -109,13 +109,13 @@ class Checkpoint:
     def __enter__(self) -> Checkpoint:
         self._lock = locked(self.directory)
         with ExitStack() as cleanup_on_error:
-            cleanup_on_error.callback(self._leave)
+            cleanup_on_error.callback(self._unlock)
             self.check()
             for leftover in self.directory.glob(".*.partial"):
                 leftover.unlink()
             if not self.path.exists():
                 replace(self.path, [line(msgspec.json.encode(self.identity))])
-            # unbuffered: a row is with the system when add returns, and a failed write leaves nothing to fail again
+            # unbuffered: the system has the row when add returns, and a failed write leaves no buffer that fails again
             self._file = cleanup_on_error.enter_context(self.path.open("r+b", buffering=0))
             self._reader = cleanup_on_error.enter_context(self.path.open("rb"))
             self._read()
@@ -127,33 +127,33 @@ class Checkpoint:
         if first is None:
             raise InputError(f"{self.path} is damaged in its first line.", "Give another --out.")
         try:
-            there = msgspec.json.decode(first, type=dict[str, str])
-            require_same(records.of_identity(there), self.identity, self.path)
+            stored = msgspec.json.decode(first, type=dict[str, str])
+            require_same(records.of_identity(stored), self.identity, self.path)
         except msgspec.MsgspecError:
             raise InputError(f"{self.path} is damaged in its first line.", "Give another --out.") from None
         end = self._reader.tell()
-        for whole in self._reader:
-            content = verified(whole[:-1]) if whole.endswith(b"\n") else None
+        for entry in self._reader:
+            content = verified(entry[:-1]) if entry.endswith(b"\n") else None
             if content is not None:
                 with suppress(msgspec.MsgspecError):
                     index, _ = msgspec.json.decode(content, type=tuple[int, msgspec.Raw])
                     self.offsets[index] = end
-            elif not whole.endswith(b"\n"):
+            elif not entry.endswith(b"\n"):
                 break
-            end += len(whole)
-        # what a kill cut short goes, so that the next line starts on its own
+            end += len(entry)
+        # a truncated last line is removed, so that the next row starts a line
         self._file.truncate(end)
         self._file.seek(end)
 
     def saved(self, index: int) -> Saved:
-        """Where the row of that index keeps its place."""
-        return Saved(self._place(index), f"{self._digest} row {index}", self.every)
+        """The resume point of the row of that index."""
+        return Saved(self._partial_file(index), f"{self._digest} row {index}", self.every)
 
-    def _place(self, index: int) -> Path:
+    def _partial_file(self, index: int) -> Path:
         return self.directory / f"row-{index}.partial"
 
     def add(self, index: int, row: Row) -> None:
-        """Keep a finished row.  Raises OSError where the disk takes it only in part; then it is measured again."""
+        """Append a finished row.  Raises OSError where it is written only in part; then it is measured again."""
         offset = self._file.tell()
         content = line(msgspec.json.encode((index, row)))
         view = memoryview(content)
@@ -163,10 +163,10 @@ class Checkpoint:
             os.fsync(self._file.fileno())
             self._synced = monotonic()
         self.offsets[index] = offset
-        self._place(index).unlink(missing_ok=True)
+        self._partial_file(index).unlink(missing_ok=True)
 
     def rows(self, indices: range | list[int]) -> Iterator[Row]:
-        """The finished rows of those indices, one after the other from the disk."""
+        """The finished rows of those indices, read from the disk one at a time."""
         for index in indices:
             self._reader.seek(self.offsets[index])
             content = verified(self._reader.readline().removesuffix(b"\n"))
@@ -186,33 +186,33 @@ class Checkpoint:
                 partial.unlink(missing_ok=True)
         self._open.close()
 
-    def _leave(self) -> None:
-        name = self.directory / ".lock"
+    def _unlock(self) -> None:
+        lock_file = self.directory / ".lock"
         try:
-            # while the lock is held: whoever waits for this file finds that it is no longer the one
-            name.unlink(missing_ok=True)
+            # removed while the lock is held: a process that waits for this file notices that it was replaced
+            lock_file.unlink(missing_ok=True)
             self._lock.release()
-        except PermissionError:  # Windows: not while it is open, and not where another run has it open
+        except PermissionError:  # Windows: an open file cannot be removed
             self._lock.release()
             with suppress(OSError):
-                name.unlink()
-        with suppress(OSError):  # only an empty folder goes: nothing was finished, so nothing stays
+                lock_file.unlink()
+        with suppress(OSError):  # only an empty folder is removed
             self.directory.rmdir()
 
 
 def identity_of(report: Report) -> dict[str, str]:
-    """Plan, program and machine of a report: with these the same its rows are the same."""
-    surroundings = report.environment
+    """Plan, program and machine of a report, which determine its rows."""
+    environment = report.environment
     plan = {f"plan {key}": value for key, value in report.plan.items()}
     return plan | {
-        **surroundings["packages"],
-        **{f"integrator {name}": said for name, said in surroundings.get("integrators", {}).items()},
-        **{key: str(surroundings[key]) for key in ("commit", "processor", "simd_width_double")},
+        **environment["packages"],
+        **{f"integrator {name}": version for name, version in environment.get("integrators", {}).items()},
+        **{key: str(environment[key]) for key in ("commit", "processor", "simd_width_double")},
     }
 
 
 def require_same(there: dict[str, str], here: dict[str, str], where: Path) -> None:
-    """Raises InputError that names each key in which two identities differ, with both values."""
+    """Raises InputError with each key in which two identities differ, and both values."""
     different = [key for key in (*there, *(here.keys() - there.keys())) if there.get(key) != here.get(key)]
     if different:
         raise InputError(
@@ -224,17 +224,17 @@ def require_same(there: dict[str, str], here: dict[str, str], where: Path) -> No
 
 
 def locked(directory: Path) -> FileLock:
-    """The lock of a directory, held; raises InputError where another process holds it."""
+    """The acquired lock of a directory; raises InputError where another process holds it."""
     from filelock import FileLock, Timeout
 
-    # a process of several threads may end a run in another one than it began in
+    # a run may end in another thread than it began in
     lock = FileLock(directory / ".lock", thread_local=False)
     while True:
         directory.mkdir(parents=True, exist_ok=True)
         try:
             lock.acquire(timeout=_WAIT, poll_interval=_WAIT / 10)
         except FileNotFoundError:
-            continue  # the run before removed its folder just now
+            continue  # the previous run has just removed its folder
         except Timeout:
             raise InputError(f"Another run writes to {directory}.", "Wait for it, or give another --out.") from None
         return lock

@@ -1,6 +1,6 @@
-"""The contract of an integrator, gone through: what it must answer to odd and to plain requests, in plain sentences.
+"""Checks of the contract of an integrator by ordinary and unusual requests, reported in sentences.
 
-Nothing is scored here: that an answer is right to 5 % is all that is asked of its accuracy.
+Nothing is scored here: of accuracy only agreement to 5 % is required.
 """
 
 from __future__ import annotations
@@ -31,29 +31,29 @@ from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 _PATIENCE = 60
-"""Seconds of one request, at most; a shorter timeout of the integrator's own counts."""
+"""Largest seconds of one request, unless the timeout of the integrator is shorter."""
 _FAREWELL = 2.0
-_OFF = 0.05
-"""An error beyond which a state is that of another motion, in units of its largest component, at |t| <= 10."""
+_LARGEST_ERROR = 0.05
+"""Largest error of a state at |t| <= 10, relative to its largest component; beyond it the motion is another one."""
 _ATTITUDE_TIMES = (Fraction(1, 4), Fraction(1), Fraction(3, 2), Fraction(2))
-_AS_RIGHT = 100
-"""How many times as large the error of a motion back in time may be as that of its mirror image."""
-_RESTART = 1000
-"""eps by which a run that stops and goes on may differ, whatever its error."""
-_BY_ITS_ERROR = 10
-"""Times the error of a run by which the same may differ: of what keeps a memory, or finds its steps anew."""
-_REPRESENTED = 16
-"""eps by which a start may be off that was held as a quaternion, say."""
+_BACKWARD_RATIO = 100
+"""Largest ratio of the error of a motion backward in time to that of its mirror image."""
+_RESTART_EPS = 1000
+"""Allowed difference, in eps, of a run that is restarted half way, whatever its error."""
+_ERROR_MULTIPLE = 10
+"""Allowed difference in units of the error of the run: for multistep methods, and those that choose steps anew."""
+_REPRESENTATION_EPS = 16
+"""Allowed difference, in eps, of a start that is represented otherwise, for example by a quaternion."""
 _HUGE = 10**150
 _HUGE_REQUEST = "At |Ω| = 1e150, t = 1"
 _MANY = [Fraction(i, 500) for i in range(1, 1001)]
 _BETWEEN = [Fraction(2 * i, 41) for i in range(1, 42)]
-"""Times that no step is likely to end at by itself."""
-_SETTINGS = {"tolerance": (Fraction(1, 10**6), Fraction(1, 10**9)), "step": (Fraction(1, 10), Fraction(1, 20))}
-_NOT_DENSE = 30
-"""Times the error at the ends of runs which that between steps may be."""
-_LEAST_DENSE, _HALF = 2.5, 0.5
-"""The power of the step by which errors between steps fall at least, but for half of the order: linear ones have 2."""
+"""Times at which no step is likely to end."""
+_CONTROLS = {"tolerance": (Fraction(1, 10**6), Fraction(1, 10**9)), "step": (Fraction(1, 10), Fraction(1, 20))}
+_DENSE_RATIO = 30
+"""Largest ratio of the error between steps to that at the ends of runs."""
+_LEAST_DENSE_ORDER, _ORDER_MARGIN = 2.5, 0.5
+"""Least order of the dense output, and its allowed gap below the method's; linear interpolation has 2."""
 NOT_TRIED = (
     "Not tried here: its accuracy, its order, its seconds, answers kept from earlier calls. A plan measures these: "
     "heavytop run --plan gate --integrator NAME."
@@ -64,7 +64,7 @@ Verdict = Literal["kept", "violated", "note"]
 
 
 class _Between(NamedTuple):
-    """Errors at times between steps, and where runs end; the steps of the longest of these, and the declared order."""
+    """The largest errors between steps and at the ends of runs; the steps of the longest run; the declared order."""
 
     between: Fraction
     ends: Fraction
@@ -74,7 +74,7 @@ class _Between(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """One part of the contract: its name, whether it is kept, and what was found, in a sentence."""
+    """One part of the contract: its name, the verdict, and the observation in a sentence."""
 
     check: str
     verdict: Verdict
@@ -84,7 +84,7 @@ class Checked:
 def check(which: str | IntegratorSource) -> list[Checked]:
     """Every part of the contract of a third-party integrator, or one that is named.
 
-    A Python integrator is called in a process of its own, which is ended where one part takes more than a minute.
+    A Python integrator runs in a process of its own, which is killed where one part takes more than a minute.
     Raises InputError for an unknown integrator.
     """
     registry.require(which)
@@ -100,7 +100,7 @@ def check(which: str | IntegratorSource) -> list[Checked]:
 
 
 def _checks(which: str | IntegratorSource, process: GuardedProcess | None) -> Iterator[Checked]:
-    """Each part; where one of the first is violated, or one ends its process, no other is tried."""
+    """Each part in turn, up to a violation of one of the first or one that ended the process."""
     for index, (name, _) in enumerate(_Contract(which).parts()):
         checked, ended = (_part(which, index), False) if process is None else _in_child(process, which, index, name)
         yield checked
@@ -110,11 +110,11 @@ def _checks(which: str | IntegratorSource, process: GuardedProcess | None) -> It
 
 
 def _in_child(process: GuardedProcess, which: str | IntegratorSource, index: int, name: str) -> tuple[Checked, bool]:
-    """That part in the process, and whether it has ended it."""
+    """One part, checked in the process, and whether that ended the process."""
     seconds = _PATIENCE_OF.get(name, _PATIENCE)
     try:
         future = process.submit(_part, which, index)
-        # an interrupt that comes from the child was raised by the integrator
+        # an interrupt from the child was raised by the integrator
         error = future.exception(timeout=seconds)
         if error is None:
             return future.result(), False
@@ -133,17 +133,17 @@ def _in_child(process: GuardedProcess, which: str | IntegratorSource, index: int
 
 
 def _part(which: str | IntegratorSource, index: int) -> Checked:
-    """That part of the contract."""
+    """The part of the contract with that index."""
     begin_row()
     return _judged(*_Contract(which).parts()[index])
 
 
 _FIRST = 2
-"""Parts that nothing works without."""
+"""Number of parts that all others require."""
 _TOO_FAST = "huge"
 _HUGE_SECONDS = 2.0
 _PATIENCE_OF = {_TOO_FAST: _HUGE_SECONDS}
-"""Seconds of single parts: the motion that is too fast to follow, where no program answers that it is."""
+"""Seconds of particular parts: for a motion too fast to follow, on which no program answers in time."""
 
 
 class _Violated(Exception):
@@ -155,7 +155,7 @@ class _Note(Exception):
 
 
 class _Contract:
-    """The checks of one integrator, each a method that returns what it found or raises what is wrong."""
+    """The checks of one integrator: each method returns an observation, or raises a violation or a note."""
 
     def __init__(self, which: str | IntegratorSource) -> None:
         self.which = which
@@ -172,17 +172,17 @@ class _Contract:
 
     @cached_property
     def declared(self) -> Declared:
-        """Its declaration; asked for where it runs, as that imports it."""
+        """Its declaration, read where the integrator runs, since that imports it."""
         return described(self.which).declared
 
     @cached_property
     def axis(self) -> Vector:
-        """A vertical along a principal axis, e3 if it can be, at which its coordinates are not singular."""
+        """A vertical along a principal axis, preferably e3, at which its coordinates are not singular."""
         axes = [vector([sign * (k == i) for i in range(3)], "γ") for sign in (1, -1) for k in (2, 1, 0)]
         return next((axis for axis in axes if not self.declared.is_singular(axis)), axes[0])
 
     def parts(self) -> list[tuple[str, Callable[[], str]]]:
-        """The name of each part, and what tries it."""
+        """The name of each part, and its check."""
         parts: list[tuple[str, Callable[[], str]]] = [
             ("start", self._starts),
             ("one time", partial(self._plain, "At t = 1 it")),
@@ -220,8 +220,8 @@ class _Contract:
     ) -> Trajectory:
         sign = -1 if self.backward_only else 1
         instants = [sign * Fraction(time) for time in times]
-        about = (top or self.top, start or self.start, instants, precision or self.precision)
-        run = registry.ready(self.which)(*about, system=system or self.system, **more)
+        problem = (top or self.top, start or self.start, instants, precision or self.precision)
+        run = registry.ready(self.which)(*problem, system=system or self.system, **more)
         if run.outcome is not Outcome.SUCCESS:
             raise _Violated(f"It ends as {run.outcome.value} at t = {decimal_text(run.time_reached, 6)}.")
         return run
@@ -237,9 +237,9 @@ class _Contract:
         return f"It says that it is {greeting}."
 
     def _plain(self, subject: str, times: Sequence[int | Fraction] = (1,), case: Any = None, **more: Any) -> str:
-        """Whether a run of a case is right."""
-        about = {} if case is None else {"start": case.start, "top": case.top, "system": case.system}
-        return self._right(self._run(times, **about, **more), subject, case)
+        """Checks a run of a case against the reference."""
+        problem = {} if case is None else {"start": case.start, "top": case.top, "system": case.system}
+        return self._right(self._run(times, **problem, **more), subject, case)
 
     def _start_alone(self) -> str:
         try:
@@ -259,8 +259,8 @@ class _Contract:
         values = [exact(value) for state in self._run([1, 2, 3]).states for value in state]
         for digits in range(1, self.precision.digits - 1):
             if all(rounded(Fraction(decimal_text(v, digits)), self.precision) == v for v in values):
-                wanted = self.precision.digits
-                raise _Violated(f"Its numbers have {digits} significant digits: {self.precision.name} takes {wanted}.")
+                needed = self.precision.digits
+                raise _Violated(f"Its numbers have {digits} significant digits: {self.precision.name} takes {needed}.")
         for bits in (24, 53, 64):
             if bits < self.precision.bits and all(round_to(value, bits) == value for value in values):
                 raise _Violated(f"Its numbers have {bits} bits, those of {self.precision.name} {self.precision.bits}.")
@@ -275,16 +275,16 @@ class _Contract:
     def _restart(self) -> str:
         if self.system is GYROSTAT:
             raise _Note(f"Not tried: a {self.system.name} does not start anew from rounded data.")
-        whole, half = self._run([2]), self._run([1])
-        values = [exact(value) for value in half.states[-1]]
-        again = self._run([1], State(values[:3], values[3:]), half.problem.top, system=self.system)
-        off, eps = _distance(whole.states[-1], again.states[-1]), self.precision.eps
-        if off <= _RESTART * eps:
-            return f"A run that starts anew at t = 1 ends as one that does not, within {_RESTART} eps."
-        differ = f"A run to t = 2 and one that starts anew at t = 1 differ by {decimal_text(off / eps, 2)} eps"
-        error = self._error(whole)
-        if off > _BY_ITS_ERROR * error:
-            raise _Violated(f"{differ}, {decimal_text(off / error if error else off, 2)} times the error of the first.")
+        uninterrupted, first_half = self._run([2]), self._run([1])
+        values = [exact(value) for value in first_half.states[-1]]
+        second_half = self._run([1], State(values[:3], values[3:]), first_half.problem.top, system=self.system)
+        gap, eps = _distance(uninterrupted.states[-1], second_half.states[-1]), self.precision.eps
+        if gap <= _RESTART_EPS * eps:
+            return f"A run that starts anew at t = 1 ends as one that does not, within {_RESTART_EPS} eps."
+        differ = f"A run to t = 2 and one that starts anew at t = 1 differ by {decimal_text(gap / eps, 2)} eps"
+        error = self._error(uninterrupted)
+        if gap > _ERROR_MULTIPLE * error:
+            raise _Violated(f"{differ}, {decimal_text(gap / error if error else gap, 2)} times the error of the first.")
         if self.declared.one_step and registry.control_name(self.which) == "step":
             raise _Note(f"{differ}, which its error explains. Where it keeps a memory, declare one_step = false.")
         return f"{differ}, which its error explains."
@@ -292,8 +292,8 @@ class _Contract:
     def _error(self, run: Trajectory) -> Fraction:
         """The largest error of the states of a run, in units of their largest component."""
         p = run.problem
-        known = propagate(self.top, self.start, list(run.times), DOUBLE, system=p.system)
-        return max(_distance(a, b) for a, b in zip(run.states, known.states, strict=True))
+        reference = propagate(self.top, self.start, list(run.times), DOUBLE, system=p.system)
+        return max(_distance(a, b) for a, b in zip(run.states, reference.states, strict=True))
 
     def _backwards(self) -> str:
         if self.program and set(self.program.directions) != {"forward", "backward"}:
@@ -305,25 +305,25 @@ class _Contract:
         return sentence
 
     def _require_as_right(self, back: Trajectory) -> None:
-        """The heavy top is reversible: from (−Ω, γ) forwards is the same motion, and a method as right on it."""
-        ahead = self._run([1], State([-w for w in self.start.omega], self.start.gamma))
-        (known,) = propagate(self.top, self.start, list(back.times), DOUBLE, system=self.system).states
-        mirrored = [sign * exact(value) for sign, value in zip((-1, -1, -1, 1, 1, 1), ahead.states[-1], strict=True)]
-        off, other = _distance(back.states[-1], known), _distance(mirrored, known)
-        if off > _RESTART * self.precision.eps + _AS_RIGHT * other:
+        """Compares with the reversed motion: forward from (−Ω, γ) a method should have about the same error."""
+        forward = self._run([1], State([-w for w in self.start.omega], self.start.gamma))
+        (reference,) = propagate(self.top, self.start, list(back.times), DOUBLE, system=self.system).states
+        mirrored = [sign * exact(value) for sign, value in zip((-1, -1, -1, 1, 1, 1), forward.states[-1], strict=True)]
+        error, mirror_error = _distance(back.states[-1], reference), _distance(mirrored, reference)
+        if error > _RESTART_EPS * self.precision.eps + _BACKWARD_RATIO * mirror_error:
             raise _Violated(
-                f"At t = -1 it is off by {decimal_text(off, 2)}, and from (−Ω, γ) forwards, which is the same motion, "
-                f"by {decimal_text(other, 2)}: its steps back in time are wrong."
+                f"At t = -1 it is off by {decimal_text(error, 2)}, and from (−Ω, γ) forwards, which is the same "
+                f"motion, by {decimal_text(mirror_error, 2)}: its steps back in time are wrong."
             )
 
     def _rest(self) -> str:
-        top = HeavyTop((3, 2, 1), 1, [-part / 2 for part in self.axis])  # hanging: upright, it amplifies noise
+        top = HeavyTop((3, 2, 1), 1, [-part / 2 for part in self.axis])  # hanging: an upright top amplifies noise
         run = self._run([1, 10], State((0, 0, 0), self.axis), top, system=HEAVY_TOP)
-        off = max(_distance(state, (0, 0, 0, *self.axis)) for state in run.states)
-        if off <= _RESTART * self.precision.eps:
+        displacement = max(_distance(state, (0, 0, 0, *self.axis)) for state in run.states)
+        if displacement <= _RESTART_EPS * self.precision.eps:
             return "A top at rest stays at rest."
-        moved = f"A top at rest moves by {decimal_text(off, 2)} until t = 10"
-        if off > _BY_ITS_ERROR * self._error(self._run([10])):
+        moved = f"A top at rest moves by {decimal_text(displacement, 2)} until t = 10"
+        if displacement > _ERROR_MULTIPLE * self._error(self._run([10])):
             raise _Violated(f"{moved}.")
         raise _Note(f"{moved}, which its error on a motion explains.")
 
@@ -336,44 +336,44 @@ class _Contract:
         step = run.flags.get("step")
         if step is not None and self.program:
             size = exact(step) if "x" not in step else Fraction(1, 100)
-            wanted = ceil(Fraction(1, 2) / size) + ceil(Fraction(3, 2) / size)
-            text = f"It counts {run.steps} steps to t = 2, where steps of {step} are {wanted}."
-            if 2 * run.steps < wanted:
+            expected = ceil(Fraction(1, 2) / size) + ceil(Fraction(3, 2) / size)
+            text = f"It counts {run.steps} steps to t = 2, where steps of {step} are {expected}."
+            if 2 * run.steps < expected:
                 raise _Violated(text)
-            if run.steps > wanted + 2:
+            if run.steps > expected + 2:
                 raise _Note(f"{text} Perhaps it counts those of a starting method, or parts of a step.")
         return f"It counts its steps: {run.steps} to t = 2."
 
     def _between_steps(self) -> str:
-        """Errors at times between steps, beside those at the ends of runs, and how they fall with the step."""
-        if (control := registry.control_name(self.which)) not in _SETTINGS:
+        """Compares the errors between steps with those at the ends of runs, and measures their order in the step."""
+        if (control := registry.control_name(self.which)) not in _CONTROLS:
             raise _Note("Not tried: it is set by nothing.")
-        coarse, fine = (self._between(control, value) for value in _SETTINGS[control])
-        if fine.between <= max(_NOT_DENSE * fine.ends, _RESTART * self.precision.eps):
+        coarse, fine = (self._between(control, value) for value in _CONTROLS[control])
+        if fine.between <= max(_DENSE_RATIO * fine.ends, _RESTART_EPS * self.precision.eps):
             return "At times between steps it is as right as at the ends of its runs."
-        seen = (
-            f"At a {control} of {decimal_text(_SETTINGS[control][1], 2)} it is off by {decimal_text(fine.between, 2)} "
+        errors = (
+            f"At a {control} of {decimal_text(_CONTROLS[control][1], 2)} it is off by {decimal_text(fine.between, 2)} "
             f"between steps, and by {decimal_text(fine.ends, 2)} where its runs end"
         )
         if fine.steps <= coarse.steps or coarse.between <= fine.between:
-            raise _Note(f"{seen}.")
+            raise _Note(f"{errors}.")
         power = log(float(coarse.between / fine.between)) / log(fine.steps / coarse.steps)
-        text = f"{seen}: between steps its error falls like the power {power:.1f} of the step"
-        if power < min(_LEAST_DENSE, fine.order - _HALF):
+        text = f"{errors}: between steps its error falls like the power {power:.1f} of the step"
+        if power < min(_LEAST_DENSE_ORDER, fine.order - _ORDER_MARGIN):
             raise _Violated(f"{text}, as that of linear interpolation, and its order is {fine.order}.")
         raise _Note(f"{text}.")
 
     def _between(self, control: str, value: Fraction) -> _Between:
-        asked, sign = registry.ready(self.which, (control, value)), -1 if self.backward_only else 1
+        propagate_at, sign = registry.ready(self.which, (control, value)), -1 if self.backward_only else 1
         runs = [
-            asked(self.top, self.start, [sign * time for time in times], self.precision, system=self.system)
+            propagate_at(self.top, self.start, [sign * time for time in times], self.precision, system=self.system)
             for times in (_BETWEEN, [Fraction(1)], _BETWEEN[-1:])
         ]
         for run in runs:
             if run.outcome is not Outcome.SUCCESS:
                 raise _Note(f"At a {control} of {decimal_text(value, 2)} it ends as {run.outcome.value}.")
-        many, *alone = runs
-        return _Between(self._error(many), max(map(self._error, alone)), alone[-1].steps, many.order)
+        dense, *ends = runs
+        return _Between(self._error(dense), max(map(self._error, ends)), ends[-1].steps, dense.order)
 
     def _attitude(self) -> str:
         if not described(self.which).carries_attitude:
@@ -382,19 +382,19 @@ class _Contract:
             )
         xi = perpendicular(self.start.gamma)
         run = self._run(_ATTITUDE_TIMES, xi=xi)
-        known = propagate(self.top, self.start, list(run.times), DOUBLE, system=self.system, xi=xi)
-        for time, state, true in zip(run.times, run.states, known.states, strict=True):
-            off = _distance(state, true)
-            if off > _OFF:
+        reference = propagate(self.top, self.start, list(run.times), DOUBLE, system=self.system, xi=xi)
+        for time, state, expected in zip(run.times, run.states, reference.states, strict=True):
+            error = _distance(state, expected)
+            if error > _LARGEST_ERROR:
                 raise _Violated(
-                    f"With the attitude its state at t = {decimal_text(time, 6)} is off by {decimal_text(off, 2)}."
+                    f"With the attitude its state at t = {decimal_text(time, 6)} is off by {decimal_text(error, 2)}."
                 )
         return "It carries the attitude."
 
     def _unknown_lines(self) -> str:
         assert self.program is not None
-        own = self.program.request(self._problem(), [exact(Fraction(1))], self._default())
-        request = _Extended(own.problem, own.times, own.control, own.hexadecimal, own.quaternion, own.body)
+        plain = self.program.request(self._problem(), [exact(Fraction(1))], self._default())
+        request = _Extended(plain.problem, plain.times, plain.control, plain.hexadecimal, plain.quaternion, plain.body)
         try:
             with session(self.program) as program:
                 reply = program.ask(request)
@@ -410,13 +410,13 @@ class _Contract:
         request = self.program.request(self._problem(), [Fraction(sign), Fraction(2 * sign)], self._default())
         with session(self.program) as program:
             alone = [list(state) for state in program.ask(request).states]
-        both = [Session(self.program) for _ in range(2)]
+        sessions = [Session(self.program) for _ in range(2)]
         try:
             with ThreadPoolExecutor(2) as threads:
-                replies = list(threads.map(lambda program: program.ask(request), both))
+                replies = list(threads.map(lambda program: program.ask(request), sessions))
         finally:
-            for running in both:
-                running.close()
+            for opened in sessions:
+                opened.close()
         if any([list(state) for state in reply.states] != alone for reply in replies):
             raise _Violated("Two of its processes at once do not answer as one alone: they share something.")
         return "Two of its processes at once answer as one alone."
@@ -439,7 +439,7 @@ class _Contract:
         return f"{_HUGE_REQUEST} it gives finite numbers."
 
     def _ask(self, command: Command, problem: Problem, seconds: float) -> None:
-        """Raises PeerFailed where it gives no state at t = 1 within so many seconds."""
+        """Raises PeerFailed where it returns no state at t = 1 within ``seconds``."""
         time = Fraction(-1 if self.backward_only else 1)
         command.declared.require(command.name, problem.start, problem.system, time, self.precision, None)
         with session(command) as program:
@@ -447,7 +447,7 @@ class _Contract:
         if reply.failure:
             raise PeerFailed(f"{command.name} failed: {reply.failure}", answered=True)
 
-    def _ended_by(self, text: bytes, what: str) -> str:
+    def _ended_by(self, text: bytes, trigger: str) -> str:
         assert self.program is not None
         program = Session(self.program)
         try:
@@ -455,8 +455,8 @@ class _Contract:
         finally:
             program.close()
         if not ended:
-            raise _Violated(f"It does not end within {_FAREWELL:g} s of {what}; its process was killed.")
-        return f"It ends at {what}."
+            raise _Violated(f"It does not end within {_FAREWELL:g} s of {trigger}; its process was killed.")
+        return f"It ends at {trigger}."
 
     def _problem(self) -> Problem:
         return Problem.of(self.top, self.start, self.precision, self.system)
@@ -466,34 +466,34 @@ class _Contract:
         return self.program.default(self.precision)
 
     def _off_start(self, state: Sequence[Any]) -> str:
-        """By how much a state is off the start, in words; "" where it is that, bit for bit."""
-        off = _distance(state, self._problem().start.flat) / self.precision.eps
-        if off > _REPRESENTED:
+        """The difference of a state from the start, in words; "" where they are equal bit for bit."""
+        difference = _distance(state, self._problem().start.flat) / self.precision.eps
+        if difference > _REPRESENTATION_EPS:
             raise _Violated("At t = 0 it does not give the start that it was given.")
-        return f", as its representation rounds it, within {decimal_text(off, 2)} eps" if off else ""
+        return f", as its representation rounds it, within {decimal_text(difference, 2)} eps" if difference else ""
 
     def _right(self, run: Trajectory, subject: str, case: Any = None) -> str:
         top, start = (self.top, self.start) if case is None else (case.top, case.start)
-        known = propagate(top, start, list(run.times), DOUBLE, system=run.problem.system)
-        pairs = zip(run.times, run.states, known.states, strict=True)
-        time, off = max(((t, _distance(a, b)) for t, a, b in pairs), key=lambda entry: entry[1])
-        if off > _OFF:
+        reference = propagate(top, start, list(run.times), DOUBLE, system=run.problem.system)
+        pairs = zip(run.times, run.states, reference.states, strict=True)
+        time, error = max(((t, _distance(a, b)) for t, a, b in pairs), key=lambda entry: entry[1])
+        if error > _LARGEST_ERROR:
             raise _Violated(
-                f"{subject} is off by {decimal_text(off, 2)} at t = {decimal_text(time, 3)}: "
+                f"{subject} is off by {decimal_text(error, 2)} at t = {decimal_text(time, 3)}: "
                 "look at the order of the components, at the signs and at how the parameters are read."
             )
-        return f"{subject} is right to {decimal_text(off, 2)}." if off else f"{subject} is right to the last bit."
+        return f"{subject} is right to {decimal_text(error, 2)}." if error else f"{subject} is right to the last bit."
 
 
 class _Extended(ProgramRequest):
-    """A request with a line that no program knows."""
+    """A request with a line unknown to every program."""
 
     def text(self, label: int) -> bytes:
         return super().text(label).replace(b"\ngo\n", b"\nunknown-to-version-1 1 2 3\ngo\n")
 
 
 def _case(system: str) -> str:
-    """The case in which a system is tried; "" for one that this program does not have."""
+    """The case for checking a system; "" for an unknown one."""
     return _CASES.get(system, "")
 
 

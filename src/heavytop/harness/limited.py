@@ -1,8 +1,8 @@
-"""Tasks in processes of their own, each under a time limit where a third-party integrator runs in it.
+"""Tasks in worker processes, with a time limit for those of third-party integrators.
 
-Every worker is one process that takes one task after another, so that a task that does not end is ended with its
-process, also where it is stuck in native code, and nothing but that task is lost.  The process leads a process group,
-which ends as a whole: what an integrator started does not outlive it.
+Every worker is one process that runs one task after another.  A task that exceeds its limit is killed with its process,
+even where it is stuck in native code, and no other task is lost.  The process leads a process group, which is killed as
+a whole: no child of an integrator survives it.
 """
 
 from __future__ import annotations
@@ -29,26 +29,26 @@ from heavytop.processes import GuardedProcess
 from heavytop.records import FAILED, OUT_OF_TIME, Row
 
 _BASE = 30.0
-"""Seconds that every row may take, on a loaded machine too."""
-_TIMES = 10.0
-"""How many times as long as expected a row may take beside that."""
+"""Seconds granted to every row, for a loaded machine."""
+_COST_FACTOR = 10.0
+"""Factor of the expected seconds, granted in addition."""
 _LEAST = 10.0
-"""Seconds of a row of an integrator that keeps running out of time."""
+"""Smallest limit, in seconds, of an integrator that repeatedly runs out of time."""
 _MOST_OUT_OF_TIME = 2
-"""Rows in which an integrator may run out of time before it is asked for no more of them."""
+"""Rows in which an integrator may run out of time before its other rows are skipped."""
 _MOST_DEATHS = 3
-_LOOKED_AT = 64
-"""Tasks that wait, among which one in the format of a worker is looked for."""
+_LOOKAHEAD = 64
+"""Waiting tasks that are searched for one in the format of a worker."""
 _AHEAD, _SHORT = 4, 0.25
-"""Tasks of a worker, the one under way among them, where each takes fewer seconds than that; else one."""
+"""Most tasks of a worker, the running one included, where each takes fewer seconds than that; else one."""
 
 
 @dataclass(slots=True)
 class _Record:
-    """Rows of one integrator: seconds over the expected cost, at most; how many just ran out of time, and in all."""
+    """Of one integrator: the largest ratio of seconds to cost; rows that ran out of time, in succession and in all."""
 
     ratio: float = 1.0
-    lost: int = 0
+    in_succession: int = 0
     out_of_time: int = 0
 
 
@@ -56,48 +56,47 @@ class _Record:
 class RowLimits:
     """Seconds that a row of a third-party integrator may take.
 
-    30 s and ten times the expected cost: that of heyoka for the same row, times
-    the largest ratio of seconds to cost among the integrator's finished rows, and at least that.  Each row in
-    succession that ran out of time divides the next limit, by 2, 3, ..., down to 10 s; once two ran out no other is
-    asked for.
-    fixed: the limit of every row in the place of all that.
+    30 s plus ten times the expected cost: that of heyoka for the same row, times the largest ratio, 1 or more, of
+    seconds to cost among the integrator's finished rows.  After 1, 2, ... rows in succession that ran out of time the
+    next limit is divided by 2, 3, ..., down to 10 s; after two such rows in all the others are skipped.
+    fixed: a limit for every row in place of this.
     """
 
     fixed: float | None = None
     _records: defaultdict[str, _Record] = field(default_factory=lambda: defaultdict(_Record))
 
     def seconds(self, task: Task, cost: float) -> float:
-        """The limit of a row that begins now."""
+        """The limit of the next row."""
         if self.fixed is not None:
             return self.fixed
         record = self._records[task.key.subject.name]
-        return max((_BASE + _TIMES * cost * record.ratio) / (1 + record.lost), _LEAST)
+        return max((_BASE + _COST_FACTOR * cost * record.ratio) / (1 + record.in_succession), _LEAST)
 
     def finished(self, task: Task, cost: float, seconds: float) -> None:
-        """A row ended by itself."""
+        """Records a row that finished."""
         record = self._records[task.key.subject.name]
-        record.lost, record.ratio = 0, max(record.ratio, seconds / cost)
+        record.in_succession, record.ratio = 0, max(record.ratio, seconds / cost)
 
     def ran_out(self, task: Task) -> None:
-        """A row was stopped at its limit."""
+        """Records a row that was stopped at its limit."""
         record = self._records[task.key.subject.name]
-        record.lost, record.out_of_time = record.lost + 1, record.out_of_time + 1
+        record.in_succession, record.out_of_time = record.in_succession + 1, record.out_of_time + 1
 
     def not_asked(self, waiting: deque[int], tasks: Sequence[Task]) -> Iterator[tuple[int, Row]]:
-        """Takes those out of the tasks that wait whose integrator has run out of time twice: their rows."""
-        lost = {name for name, record in self._records.items() if record.out_of_time >= _MOST_OUT_OF_TIME}
-        left = [index for index in waiting if lost and tasks[index].key.subject.name in lost]
-        if left:
-            others = [index for index in waiting if tasks[index].key.subject.name not in lost]
+        """Removes the waiting tasks of integrators that ran out of time twice, and yields their rows."""
+        too_slow = {name for name, record in self._records.items() if record.out_of_time >= _MOST_OUT_OF_TIME}
+        skipped = [index for index in waiting if too_slow and tasks[index].key.subject.name in too_slow]
+        if skipped:
+            remaining = [index for index in waiting if tasks[index].key.subject.name not in too_slow]
             waiting.clear()
-            waiting.extend(others)
-        for index in left:
+            waiting.extend(remaining)
+        for index in skipped:
             name = tasks[index].key.subject.name
             cause = f"{name} ran out of time in {_MOST_OUT_OF_TIME} other rows and was not asked again"
             yield index, failed(tasks[index], cause, NotAsked)
 
     def took(self, task: Task, cost: float, row: Row, seconds: float) -> None:
-        """A row of any integrator ended, by itself, at its limit or at the time limit of a request to a program."""
+        """Records the end of a row: finished, at its limit, or at the time limit of a request to a program."""
         timeout = task.source.seconds if isinstance(task.source, Command) else math.inf
         if row.outcome == OUT_OF_TIME or (row.outcome == FAILED and seconds >= timeout):
             self.ran_out(task)
@@ -106,19 +105,19 @@ class RowLimits:
 
 
 class _Worker:
-    """A process for one task after another, started when it is first used.
+    """A process that runs one task after another, started at its first task.
 
-    It serves one third-party integrator at most, which may change whatever is around it.
+    It serves one third-party integrator at most, which may change the state of the process.
 
-    rows: of its tasks, with their indices; the first is under way.  seconds: for how long, without what its process and
-    the program that this asks waited for a processor.  precision: of its last task.
+    rows: of its tasks, with their indices; the first is running.  seconds: since it began, without the time that its
+    process and the program called by it waited for a processor.  precision: of its last task.
     """
 
     def __init__(self, kinds: Kinds) -> None:
         self._kinds = kinds
         self._process: GuardedProcess | None = None
-        self._guest = ""
-        self._hello: Future[int] | None = None
+        self._third_party = ""
+        self._pid_future: Future[int] | None = None
         self._pid: int | None = None
         self.rows: deque[tuple[int, Future[Row]]] = deque()
         self.precision = ""
@@ -127,70 +126,70 @@ class _Worker:
 
     @property
     def left(self) -> float | None:
-        """Seconds until its task is to be ended; None for no limit, or where the process is not yet there."""
-        if self.limit is None or self._process is None or self._hello is not None:
+        """Seconds left to its task; None without a limit, or while the process is starting."""
+        if self.limit is None or self._process is None or self._pid_future is not None:
             return None
         return self.limit - self.seconds()
 
     def takes(self, task: Task, ahead: int, costs: Mapping[int, float]) -> bool:
-        """Whether it may be given one more, with so many before it, which are short: no task waits for a long one."""
+        """Whether it may take the task behind up to ``ahead`` others, all short: no task waits for a long one."""
         if not self.rows:
             return True
         short = all(costs[index] < _SHORT for index, _ in self.rows)
         return short and self.limit is None and not task.is_third_party and len(self.rows) <= ahead
 
     def submit(self, index: int, limit: float | None, kind: MeasuredKind, task: Task, saved: Saved) -> None:
-        """Begins a task, behind those that it has: its time runs from when the process is there."""
-        guest = task.key.subject.name if task.is_third_party else ""
-        if self._guest not in ("", guest):
+        """Submits a task behind its others; the clock of the first starts when the process has started."""
+        third_party = task.key.subject.name if task.is_third_party else ""
+        if self._third_party not in ("", third_party):
             self.end()
-        self._guest = guest
+        self._third_party = third_party
         if not self.rows:
             self.limit, self.seconds = limit, stopwatch(self._pid, with_children=True)
         if self._process is None:
             self._process = GuardedProcess(begin_worker, tuple(self._kinds.values()))
-            self._hello = self._process.submit(os.getpid)
+            self._pid_future = self._process.submit(os.getpid)
         try:
             self.rows.append((index, self._process.submit(measure, kind, task, saved)))
         except BrokenProcessPool as error:
-            if self.rows:  # told with those before it
-                lost: Future[Row] = Future()
-                lost.set_exception(error)
-                self.rows.append((index, lost))
+            if self.rows:  # reported with those before it
+                broken: Future[Row] = Future()
+                broken.set_exception(error)
+                self.rows.append((index, broken))
             else:  # it died between two tasks
                 self.end()
                 self.submit(index, limit, kind, task, saved)
 
     def finish(self) -> None:
-        """Its first task, unless it was ended with it, is done, and the next under way."""
+        """Removes the finished task, and restarts the clock for the next."""
         if self.rows:
             self.rows.popleft()
         self.seconds = stopwatch(self._pid, with_children=True)
 
     @property
     def ending(self) -> str:
-        """How its process ended by itself."""
+        """How its process died."""
         return "" if self._process is None else self._process.ending
 
     def awaited(self) -> list[Future[Any]]:
         """The futures to wait for: the process, then its row."""
-        return [future for _, future in [*self.rows][:1]] + ([] if self._hello is None else [self._hello])
+        return [future for _, future in [*self.rows][:1]] + ([] if self._pid_future is None else [self._pid_future])
 
     def greet(self) -> None:
-        """Puts a guard into the group of a process that has just begun, and starts its clock."""
-        if self._process is not None and self._hello is not None and self._hello.done():
-            with suppress(BrokenProcessPool):  # a process that is gone is noticed with its row
-                self._pid = self._hello.result()
+        """Guards the process group of a process that has just started, and starts the clock."""
+        if self._process is not None and self._pid_future is not None and self._pid_future.done():
+            with suppress(BrokenProcessPool):  # the death of a process is handled with its row
+                self._pid = self._pid_future.result()
                 self._process.guard(self._pid)
-            self._hello, self.seconds = None, stopwatch(self._pid, with_children=True)
+            self._pid_future, self.seconds = None, stopwatch(self._pid, with_children=True)
 
     def end(self) -> None:
-        """Kills the process and whatever it started."""
+        """Kills the process and its children."""
         if self._process is not None:
             self._process.end()
-        self._process = self._hello = self._pid = None
+        self._process = self._pid_future = self._pid = None
         self.rows.clear()
-        self._guest = ""
+        self._third_party = ""
 
 
 def in_processes(
@@ -203,10 +202,10 @@ def in_processes(
     begun: Callable[[Task], None],
     row_timeout: float | None,
 ) -> Iterator[tuple[int, Row]]:
-    """(index of the task, its row) as they finish, of the tasks that wait (:func:`in_order`).
+    """(index of the task, its row) as they finish, of the ``waiting`` tasks (:func:`in_order`).
 
-    A task whose process died is run again, three times in all; then it is a row that failed, or where the integrator is
-    this program's, a HeavyTopError.
+    A task whose process died is run again, three times in all; then that of a third-party integrator is a failed row,
+    any other raises HeavyTopError.
     """
     limits, deaths = RowLimits(row_timeout), Counter[int]()
     pool = [_Worker(kinds) for _ in range(max(workers, 1))]
@@ -214,7 +213,7 @@ def in_processes(
         while waiting or any(worker.rows for worker in pool):
             for ahead, worker in product(range(_AHEAD), pool):
                 if waiting and worker.takes(tasks[waiting[0]], ahead, costs):
-                    index = _taken(worker, pool, waiting, tasks)
+                    index = _next_task(worker, pool, waiting, tasks)
                     task = tasks[index]
                     limit = limits.seconds(task, costs[index]) if task.is_third_party else None
                     worker.submit(index, limit, kinds[task.key.kind], task, saved(index))
@@ -227,7 +226,7 @@ def in_processes(
                     continue
                 index, *behind = (row for row, _ in worker.rows)
                 try:
-                    row = _ended(worker, tasks[index], costs[index], limits)
+                    row = _finished_row(worker, tasks[index], costs[index], limits)
                 except BrokenProcessPool:
                     how = worker.ending
                     worker.end()
@@ -249,15 +248,16 @@ def in_processes(
             worker.end()
 
 
-def _taken(worker: _Worker, pool: Sequence[_Worker], waiting: deque[int], tasks: Sequence[Task]) -> int:
-    """The task that a worker is given next, taken out of those that wait.
+def _next_task(worker: _Worker, pool: Sequence[_Worker], waiting: deque[int], tasks: Sequence[Task]) -> int:
+    """The next task of a worker, removed from the waiting ones.
 
-    Of the first of them one in the format of its last, else in that of no other worker: each compiles for itself.
+    Among the first of them one in the format of its last task, else in one that no other worker has: each process
+    compiles for itself.
     """
     chosen = 0
     if not tasks[waiting[0]].is_third_party:
         others = {busy.precision for busy in pool if busy is not worker}
-        formats = [tasks[index].key.precision for index in islice(waiting, _LOOKED_AT)]
+        formats = [tasks[index].key.precision for index in islice(waiting, _LOOKAHEAD)]
         chosen = min(range(len(formats)), key=lambda i: (formats[i] != worker.precision, formats[i] in others))
     index = waiting[chosen]
     del waiting[chosen]
@@ -266,37 +266,38 @@ def _taken(worker: _Worker, pool: Sequence[_Worker], waiting: deque[int], tasks:
 
 
 def in_order(tasks: Sequence[Task], kinds: Kinds, done: Container[int]) -> tuple[dict[int, float], deque[int]]:
-    """The cost of each task that is not done, and these tasks in the order in which they are to begin: long ones first.
+    """The cost of each task that is not done, and the order in which these tasks begin: long ones first.
 
-    Those of third-party integrators come before them, one integrator after the other, and of each the quick ones before
-    the long ones, whose limits rest on them.
+    Before them those of third-party integrators, grouped by integrator, the quick ones first: the limits of the long
+    ones depend on them.
     """
     costs = {index: kinds[task.key.kind].cost(task) for index, task in enumerate(tasks) if index not in done}
-    guests = list(dict.fromkeys(tasks[index].key.subject.name for index in costs if tasks[index].is_third_party))
+    integrators = list(dict.fromkeys(tasks[index].key.subject.name for index in costs if tasks[index].is_third_party))
 
     def order(index: int) -> tuple[int, float]:
         task = tasks[index]
-        third_party = task.is_third_party
-        return (guests.index(task.key.subject.name), costs[index]) if third_party else (len(guests), -costs[index])
+        if not task.is_third_party:
+            return len(integrators), -costs[index]
+        return integrators.index(task.key.subject.name), costs[index]
 
     return costs, deque(sorted(costs, key=order))
 
 
 @cache
-def _kept_worker() -> _Worker:
+def _reused_worker() -> _Worker:
     return _Worker({})
 
 
 def in_limited_process(kind: MeasuredKind, task: Task, limit: float) -> tuple[Row, float]:
     """The row of a third-party integrator, measured in a child of this process within a limit, and its seconds.
 
-    The child is kept for the next row; it ends with this process.  For one thread at a time.
+    The child is reused for the next row; it ends with this process.  For one thread at a time.
     """
-    worker, limits, how = _kept_worker(), RowLimits(limit), ""
+    worker, limits, how = _reused_worker(), RowLimits(limit), ""
     for _ in range(_MOST_DEATHS):
         worker.submit(0, limit, kind, task, Saved())
         try:
-            while (row := _ended(worker, task, 1.0, limits)) is None:
+            while (row := _finished_row(worker, task, 1.0, limits)) is None:
                 _wait([worker])
                 worker.greet()
             return row, worker.seconds()
@@ -307,25 +308,25 @@ def in_limited_process(kind: MeasuredKind, task: Task, limit: float) -> tuple[Ro
 
 
 def _wait(pool: Sequence[_Worker]) -> None:
-    """Until a process is there, a row is done, or a limit is reached."""
+    """Waits until a process has started, a row is done, or a limit is reached."""
     futures = [future for worker in pool if worker.rows for future in worker.awaited()]
     left = [worker.left for worker in pool if worker.rows]
     wait(futures, min((max(seconds, 0.0) for seconds in left if seconds is not None), default=None), FIRST_COMPLETED)
 
 
-def _ended(worker: _Worker, task: Task, cost: float, limits: RowLimits) -> Row | None:
-    """The row of a worker that has ended or had to be; None where it goes on.  Raises BrokenProcessPool."""
+def _finished_row(worker: _Worker, task: Task, cost: float, limits: RowLimits) -> Row | None:
+    """The row of a worker's first task, finished or stopped; None while it runs.  Raises BrokenProcessPool."""
     _, future = worker.rows[0]
     if future.done():
         name, error = task.key.subject.name, future.exception()
         if error is None:
             row = future.result()
         elif isinstance(error, KeyboardInterrupt):
-            # a child leaves interrupts to this process, so one that comes from there was raised by its integrator
+            # children ignore SIGINT, so this was raised by the integrator
             row = failed(task, f"{name} raised KeyboardInterrupt")
         elif not task.is_third_party or isinstance(error, HeavyTopError | BrokenProcessPool):
             raise error
-        else:  # it changed what is around it, such as modules of this program
+        else:  # it changed its surroundings, such as modules of this program
             row = failed(task, f"measuring {name} failed: {type(error).__name__}: {said(error)}")
             worker.end()
         limits.took(task, cost, row, worker.seconds())

@@ -1,4 +1,4 @@
-"""Plans: what is run, written in TOML, and the single measurements they expand to."""
+"""Plans in TOML, and the single measurements to which they expand."""
 
 from __future__ import annotations
 
@@ -93,10 +93,10 @@ class Top(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
 
 
 class Plan(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
-    """A whole plan; of the tables in ``measure`` each is that of its kind.
+    """A plan; each table in ``measure`` has the type of its kind.
 
     integrator: tables of programs.  integrators: files beside that of the plan, ``mine.toml`` or ``mine.py:solve``.
-    row_timeout: seconds that a row of a third-party integrator may take.
+    row_timeout: largest seconds of a row of a third-party integrator.
     """
 
     name: str
@@ -113,7 +113,7 @@ def read(
 ) -> tuple[Plan, str, Sequence[Task]]:
     """The plan of that name or file, the hash of its text, and its measurements with the roundings of a seed.
 
-    integrator: measures whatever heyoka does too.  Integrators of the plan's own are defined in it or beside its file.
+    integrator: measured as heyoka is, in addition.  Integrators of the plan's own are defined in it or beside its file.
     Raises InputError, which names the file, where :func:`load`, :func:`expand` or :func:`with_integrator` does.
     """
     plan, digest = load(name, kinds)
@@ -153,7 +153,7 @@ def load(name: str, kinds: Kinds) -> tuple[Plan, str]:
             raise msgspec.ValidationError(f"name {plan.name[:40]!r} is not letters, digits, '.', '_' and '-'")
     except RecursionError:
         raise InputError(f"The plan {name} is nested too deeply.", _KEYS) from None
-    except ValueError as error:  # of TOML, of an integer of too many digits, and of msgspec
+    except ValueError as error:  # of TOML, of an integer with too many digits, of msgspec
         cause = f"The plan {name} is not valid: {invalid(error, Plan)}."
         raise InputError(cause, _KEYS) from None
     return plan, hashlib.sha256(text.encode()).hexdigest()
@@ -165,9 +165,9 @@ def _built_in(name: str) -> Traversable:
 
 
 def document_of(text: str) -> dict[str, Any]:
-    """The TOML document, with the numbers of :data:`QUANTITIES`, and all that are no integers, as they are written.
+    """The TOML document; the numbers of :data:`QUANTITIES`, and all that are not integers, as text.
 
-    Raises ValueError for what is no TOML.
+    Raises ValueError for text that is not TOML.
     """
     return {key: _as_written(key, value) for key, value in tomllib.loads(text, parse_float=str).items()}
 
@@ -181,7 +181,7 @@ def _as_written(key: str, value: Any) -> Any:
 
 
 def former(name: str) -> set[str]:
-    """The former names of integrators that the plan in that file gives; none of a plan that cannot be read twice."""
+    """The former names of integrators in the plan of that file; none where it cannot be read a second time."""
     try:
         return records.in_document(document_of(Path(name).read_text("utf-8"))) if Path(name).is_file() else set()
     except (OSError, ValueError, RecursionError):
@@ -189,9 +189,7 @@ def former(name: str) -> set[str]:
 
 
 def definitions(plan: Plan, folder: Path) -> dict[str, IntegratorSource]:
-    """The integrators that a plan in that folder defines, by name; raises InputError for an invalid one, and for two of
-    one name.
-    """
+    """The integrators that a plan in that folder defines, by name; raises InputError for an invalid or repeated one."""
     sources: list[IntegratorSource] = [command_of(table, folder, f"The plan {plan.name}") for table in plan.integrator]
     for text in plan.integrators:
         if text.endswith(".toml"):
@@ -213,9 +211,9 @@ def definitions(plan: Plan, folder: Path) -> dict[str, IntegratorSource]:
 def _by_name(
     plan: Plan, defined: Mapping[str, IntegratorSource], folder: Path
 ) -> tuple[Plan, dict[str, IntegratorSource]]:
-    """The plan with the names of integrators where its tables give files in that folder, and these among the defined.
+    """The plan with integrators by name in place of files in that folder, and all integrators so defined.
 
-    Raises InputError for a file that describes none, and where one of that name is defined elsewhere.
+    Raises InputError for a file that describes none, and where another integrator has the same name.
     """
     known = dict(defined)
 
@@ -235,7 +233,7 @@ def _by_name(
 
 
 def with_integrator(plan: Plan, integrator: str | IntegratorSource) -> Plan:
-    """The plan with the same measurements of another integrator after heyoka's.
+    """The plan with heyoka's measurements repeated for another integrator.
 
     Raises InputError for an unknown integrator, for heyoka itself and for a plan that measures no integrator.
     """
@@ -264,7 +262,7 @@ def of_document(document: dict[str, Any], kinds: Kinds) -> Plan:
 
 
 def _require_kinds(table: dict[str, Any], section: str, known: Collection[str]) -> None:
-    """Raises ValidationError for a table of a kind that is not there: with those that are, and the nearest."""
+    """Raises ValidationError for a table of an unknown kind, with the known kinds and the nearest of them."""
     entries = table.get(section)
     for index, entry in enumerate(entries if isinstance(entries, list) else []):
         kind = entry.get("kind") if isinstance(entry, dict) else None
@@ -277,7 +275,7 @@ def _require_kinds(table: dict[str, Any], section: str, known: Collection[str]) 
 
 
 def _require_keys(document: dict[str, Any], tables: Mapping[str, type[PlanTable]]) -> None:
-    """Raises ValidationError for a [[measure]] with a key that its kind does not have: with those that it has."""
+    """Raises ValidationError for a [[measure]] with a key unknown to its kind, with the known keys."""
     entries = records.of_document(document).get("measure")
     for index, entry in enumerate(entries if isinstance(entries, list) else []):
         table = tables.get(entry.get("kind", "")) if isinstance(entry, dict) else None
@@ -290,17 +288,17 @@ def _require_keys(document: dict[str, Any], tables: Mapping[str, type[PlanTable]
 
 
 def expand(plan: Plan, seed: int = 0, defined: Mapping[str, IntegratorSource] | None = None) -> Sequence[Task]:
-    """The plan's measurements in its order, with the roundings of a seed; those over a sweep are made when asked for.
+    """The plan's measurements in its order, with the roundings of a seed; those over a sweep are made on demand.
 
     defined: integrators of the plan's own, by name.
     Raises InputError for an unknown case, integrator or precision, an impossible value or seed, data that a format
-    cannot hold, two measurements of the same, and a top or sweep that nothing measures.
+    cannot represent, a repeated measurement, and a top or sweep that nothing measures.
     """
     if not 0 <= seed <= MOST_SEEDS:
         raise InputError(f"seed must be from 0 to {MOST_SEEDS}; got {seed}.", f"Give a number from 0 to {MOST_SEEDS}.")
-    own, swept = _own(plan), _swept(plan)
+    own_cases, swept = _own_tops(plan), _swept(plan)
     sweeps = list(zip(plan.sweep, swept.values(), strict=True))
-    known = own | {name: cases[0] for name, cases in swept.items()}
+    known = own_cases | {name: cases[0] for name, cases in swept.items()}
     measured = {name for table in plan.measure for name in getattr(table, "cases", [])}
     if unused := known.keys() - measured:
         raise InputError(
@@ -309,13 +307,13 @@ def expand(plan: Plan, seed: int = 0, defined: Mapping[str, IntegratorSource] | 
         )
     parts = [
         ([replace(task, seed=seed) for task in table.tasks(lambda name: case(name, known))], cases)
-        for whole in plan.measure
+        for entry in plan.measure
         for table, cases in _parts(
-            whole, {name: whole.swept(*entry) for name, entry in zip(swept, sweeps, strict=True)}
+            entry, {name: entry.swept(*sweep) for name, sweep in zip(swept, sweeps, strict=True)}
         )
     ]
     sources: dict[str, IntegratorSource | None] = {}
-    seen: dict[RowKey, str] = {}
+    labels: dict[RowKey, str] = {}
     for templates, _ in parts:
         for index, task in enumerate(templates):
             subject = task.key.subject
@@ -323,28 +321,28 @@ def expand(plan: Plan, seed: int = 0, defined: Mapping[str, IntegratorSource] | 
                 sources[subject.name] = (defined or {}).get(subject.name)
                 require_integrator(sources[subject.name] or subject.name)
             task = templates[index] = replace(task, source=sources.get(subject.name))
-            work = _exactly(task.key)
-            if work in seen:
-                other = "" if seen[work] == task.label else f", also as {seen[work]}"
+            work = _with_exact_control(task.key)
+            if work in labels:
+                other = "" if labels[work] == task.label else f", also as {labels[work]}"
                 raise InputError(f"The plan {plan.name} measures {task.label} twice{other}.", "Name each once.")
-            if task.label in seen.values():  # one case at several horizons
+            if task.label in labels.values():  # one case at several horizons
                 templates[index] = replace(task, suffix=f"{task.suffix}/T={task.key.horizon}")
-            seen[work] = templates[index].label
+            labels[work] = templates[index].label
             _require_fit(task)
-    if not seen:
+    if not labels:
         raise InputError(f"The plan {plan.name} measures nothing.", "Give it at least one [[measure]] with cases.")
     ends = list(accumulate(len(templates) * len(cases or (None,)) for templates, cases in parts))
 
     def task_at(index: int) -> Task:
         part = bisect_right(ends, index)
         templates, cases = parts[part]
-        template, which = divmod(index - (ends[part - 1] if part else 0), len(templates))
-        return templates[which].of(cases[template]) if cases else templates[which]
+        case_index, template = divmod(index - (ends[part - 1] if part else 0), len(templates))
+        return templates[template].of(cases[case_index]) if cases else templates[template]
 
     return Lazy(ends[-1], task_at)
 
 
-def _own(plan: Plan) -> dict[str, Case]:
+def _own_tops(plan: Plan) -> dict[str, Case]:
     """The plan's own tops by name."""
     own: dict[str, Case] = {}
     for top in plan.top:
@@ -359,12 +357,14 @@ def _own(plan: Plan) -> dict[str, Case]:
 
 
 def warnings(plan: Plan) -> list[str]:
-    """Warnings of data that no rigid body can have, though the equations do not mind, of the plan's own tops."""
-    return [f"top {name}: {text}" for name, case in _own(plan).items() for text in (case.body or case.top).warnings()]
+    """Warnings about the plan's own tops: data that no rigid body has, though the equations admit them."""
+    return [
+        f"top {name}: {text}" for name, case in _own_tops(plan).items() for text in (case.body or case.top).warnings()
+    ]
 
 
 def _swept(plan: Plan) -> dict[str, Sequence[Case]]:
-    """The cases of each sweep, by the name under which tables ask for them."""
+    """The cases of each sweep, by its name in tables."""
     swept: dict[str, Sequence[Case]] = {}
     for index, sweep in enumerate(plan.sweep):
         _require_name(sweep.name, "sweep")
@@ -382,15 +382,15 @@ def _require_name(name: str, what: str) -> None:
         raise InputError(f"The {what}'s name {name[:40]!r} is not letters, digits, '.', '_' and '-'.", _RENAME)
 
 
-def _exactly(key: RowKey) -> RowKey:
-    """The key with its setting as fractions: 1e-3 and 0.001 are the same work."""
-    settings = {name: getattr(key.subject, name) for name in ("tolerance", "step", "bias")}
-    exactly = {name: text if text in ("", FINEST) else str(exact(text)) for name, text in settings.items()}
+def _with_exact_control(key: RowKey) -> RowKey:
+    """The key with its control parameter as a fraction: 1e-3 and 0.001 are the same measurement."""
+    controls = {name: getattr(key.subject, name) for name in ("tolerance", "step", "bias")}
+    exactly = {name: text if text in ("", FINEST) else str(exact(text)) for name, text in controls.items()}
     return msgspec.structs.replace(key, subject=msgspec.structs.replace(key.subject, **exactly))
 
 
 def _require_fit(task: Task) -> None:
-    """Raises InputError, with the name of the task, where its format is not there or cannot hold its data."""
+    """Raises InputError, with the name of the task, where its format is unavailable or cannot represent its data."""
     if task.case is None or not task.has_precision:
         return
     with prefixed(f"{task.label}"):
@@ -401,7 +401,7 @@ def _require_fit(task: Task) -> None:
 
 
 def _parts(table: PlanTable, swept: dict[str, Sequence[Case]]) -> list[tuple[PlanTable, Sequence[Case] | None]]:
-    """The table itself, or one for each of its cases where one is a sweep: then the table is of the sweep's first."""
+    """The table itself, or where a case is a sweep one table for each case, with the cases of the sweep."""
     names: list[str] = getattr(table, "cases", [])
     if not swept.keys() & set(names):
         return [(table, None)]
@@ -415,13 +415,13 @@ _MAX_SAMPLES = 1_000_000
 
 
 def log_spaced(count: int) -> list[int]:
-    """About eight integers a decade from 1 to ``count``, both included."""
-    wanted = {count}
+    """About eight integers per decade from 1 to ``count``, both included."""
+    selected = {count}
     i = 0
     while (value := round(10 ** (i / 8))) < count:
-        wanted.add(value)
+        selected.add(value)
         i += 1
-    return sorted(wanted)
+    return sorted(selected)
 
 
 def positive(texts: list[str], what: str) -> list[Fraction]:
@@ -433,7 +433,7 @@ def positive(texts: list[str], what: str) -> list[Fraction]:
 
 
 def samples(count: int) -> int:
-    """The count; raises InputError where it cannot be."""
+    """The count; raises InputError unless it is valid."""
     if not 1 <= count <= _MAX_SAMPLES:
         raise InputError(f"samples must be from 1 to {_MAX_SAMPLES}; got {count}.", "Give, for example, 100.")
     return count
@@ -445,6 +445,6 @@ def signed(times: list[Fraction], direction: str) -> tuple[Fraction, ...]:
 
 
 def uniform(horizon: Fraction, count: int) -> tuple[tuple[Fraction, ...], tuple[Fraction, ...]]:
-    """``count`` uniform samples up to the horizon, and those of them that go into a series, about eight a decade."""
+    """``count`` uniform samples up to the horizon, and those of them for a series, about eight per decade."""
     times = tuple(horizon * i / count for i in range(1, samples(count) + 1))
     return times, tuple(times[i - 1] for i in log_spaced(count))

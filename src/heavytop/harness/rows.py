@@ -1,4 +1,4 @@
-"""From what was measured to a row of the report."""
+"""Tasks, and the rows of a report made from what they measure."""
 
 from __future__ import annotations
 
@@ -67,14 +67,13 @@ from heavytop.top.heavy_top import HeavyTop, State
 class Task:
     """One measurement, and the row it will fill.
 
-    key: of the row.  suffix: behind the case in what the row calls it: a direction, a horizon.  subject: what is
-    measured.
+    key: of the row.  suffix: follows the case in its name: a direction, a horizon.  subject: what is measured.
     case: None where no motion is measured.
-    times: exact, of the sign of the direction; keep: those that go into the series.
-    options: what else the kind of measurement needs to know, and it alone.
-    request: what decides the outcome beside key, case and times; it stands in the row.
-    seed: which roundings; 0 for those of the data as given.
-    source: of an integrator that is neither built in nor a package's.
+    times: exact, of the sign of the direction; keep: those stored in the series.
+    options: further parameters of this kind of measurement.
+    request: further parameters, stored in the row, that determine the outcome.
+    seed: of the perturbed roundings; 0 for the data unperturbed.
+    source: of an integrator that is neither built in nor from a package.
     """
 
     key: RowKey
@@ -125,7 +124,7 @@ class Task:
 
     @property
     def is_third_party(self) -> bool:
-        """Whether code or a program of others computes the motion."""
+        """Whether third-party code or a third-party program computes the motion."""
         return self.key.subject.what == "computed" and is_third_party(self.key.subject.name)
 
     @property
@@ -135,7 +134,7 @@ class Task:
         return replace(self.case, top=scaled(self.case.top, factor(self.seed))) if self.seed else self.case
 
     def require_reach(self) -> None:
-        """Raises OutOfReach where what is measured is a run of too many steps."""
+        """Raises OutOfReach where the run would take too many steps."""
         subject, case = self.key.subject, self.case
         if subject.what == "computed" and case is not None and self.times:
             problem = Problem.of(case.top, case.start, self.precision, case.system)
@@ -144,7 +143,7 @@ class Task:
 
     @property
     def label(self) -> str:
-        """For progress and messages."""
+        """The name of the task in progress displays and messages."""
         plain = self.subject in (HEYOKA, self.key.kind)
         system = self.key.system if self.case is None else ""
         precision = self.key.precision if self.has_precision else ""
@@ -153,13 +152,13 @@ class Task:
 
     @property
     def run_seconds(self) -> float:
-        """Seconds that multiword, or heyoka for all others, take for such a motion, roughly."""
+        """Estimated seconds of the run by multiword; of any other integrator those of heyoka."""
         step = (words_seconds if self.key.subject.name == MULTIWORD else seconds_a_step)(self.precision.bits)
         return float(abs(self.times[-1])) * 4 * step + len(self.times) * 1e-4
 
 
 def run_with_attitude(task: Task) -> tuple[Trajectory, AttitudeScorer]:
-    """The run of a task with ξ beside Ω and γ, and what measured it; begun anew where it was interrupted."""
+    """The run of a task with ξ beside Ω and γ, and its scorer; restarted where it was interrupted."""
     case, precision = task.given, task.precision
     times, keep = ([exact(number(time, precision)) for time in part] for part in (task.times, task.keep))
     xi = resolve(case.body or case.top, case.given_start or case.start).xi
@@ -171,12 +170,12 @@ def run_with_attitude(task: Task) -> tuple[Trajectory, AttitudeScorer]:
 
 
 def computed(name: str, **setting: Any) -> Subject:
-    """The integrator of that name with a setting as a subject."""
+    """The subject of an integrator with its control parameter."""
     return Subject("computed", name, **setting)
 
 
 def seconds_a_step(bits: int) -> float:
-    """Seconds that one step of heyoka takes in a format of so many bits, roughly."""
+    """Estimated seconds of one step of heyoka in a format of ``bits`` bits."""
     return 1e-6 if bits <= 53 else 5e-6 if bits <= 64 else 5e-4 * (bits / 113) ** 2.5
 
 
@@ -186,7 +185,7 @@ def time_metric(time: Fraction | None, kind: MetricKind) -> Metric:
 
 
 def data_of(case: Case | None) -> Data | None:
-    """The exact data of the motion that is measured; of an ensemble the start by which the others are drawn."""
+    """The exact data of the measured motion; of an ensemble those of the start from which the others are drawn."""
     if case is None:
         return None
     top, start = case.top, case.start
@@ -204,7 +203,7 @@ def exact_row(
     bits: int = 0,
     series: dict[str, Series] | None = None,
 ) -> Row:
-    """The row of what is evaluated, not integrated.  Its samples are the times of the task."""
+    """The row of an evaluation without integration.  Its samples are the times of the task."""
     return Row(
         case=task.title,
         integrator=task.subject,
@@ -226,9 +225,9 @@ def exact_row(
 def computed_row(
     task: Task, run: Trajectory, metrics: dict[str, Metric], series: dict[str, Series], reference: Against
 ) -> Row:
-    """The row of a run: where it ended, what made its bits, and what was measured of it.
+    """The row of a run: its outcome, the data and flags that determine its bits, and its metrics.
 
-    A run that gives fewer samples than its task has times is incomplete, whatever it says of itself; finite only where
+    A run with fewer samples than its task has times is incomplete, whatever outcome it reports; it is finite only where
     it reached the last time and every metric is a number.
     """
     case, precision = task.given, run.problem.precision
@@ -270,9 +269,9 @@ _OUTCOMES: dict[type[HeavyTopError], str] = {
 
 
 def _amplification(problem: Problem, horizon: Fraction) -> float | None:
-    """That of the motion of a problem, to three digits; None for data beyond double.
+    """The amplification of a motion, to three digits; None for data beyond double.
 
-    Of the data rounded to double: all formats of a case share one path.
+    Computed from the data rounded to double: all formats of a case share one value.
     """
     try:
         parameters = problem.parameters.mapped(_in_double)
@@ -284,12 +283,12 @@ def _amplification(problem: Problem, horizon: Fraction) -> float | None:
 
 
 def _in_double(value: Fraction) -> Fraction:
-    """The nearest double; the value itself where that is 0.  Raises OverflowError beyond them."""
+    """The nearest double; the value itself where that is 0.  Raises OverflowError beyond the largest double."""
     return Fraction(float(value)) or Fraction(value)
 
 
 def unmeasured(task: Task, reason: HeavyTopError) -> Row:
-    """The row of a task that was aborted: an outcome of its own, no metric, and why in the place of a reference."""
+    """The row of an aborted task: its outcome, no metric, and the reason in place of a reference."""
     return Row(
         case=task.title,
         integrator=task.subject,
@@ -307,20 +306,20 @@ def unmeasured(task: Task, reason: HeavyTopError) -> Row:
 
 
 def failed(task: Task, cause: str, kind: type[HeavyTopError] = PeerFailed) -> Row:
-    """The row of a task whose integrator failed: ``cause``, and in which case at which setting."""
+    """The row of a task whose integrator failed: ``cause``, the case and the control parameter."""
     setting = task.key.subject.setting
     return unmeasured(task, kind(" ".join(part for part in (f"{cause}, in", task.title, setting) if part)))
 
 
 def input_rounding(top: HeavyTop, start: State, problem: Problem) -> Fraction:
-    """The largest relative rounding of the data that the run was given: not charged to it, but said."""
+    """The largest relative rounding of the input data: reported, not counted as an error of the run."""
     exact_parameters = problem.system.parameters(top, start)
     rounded = problem.parameters.numbers, problem.start.flat
     pairs = zip((*exact_parameters.mapped(Fraction).numbers, *start.flat), sum(rounded, ()), strict=True)
     return max(abs(b - a) / abs(a) if a else Fraction(0) for a, b in pairs)
 
 
-# What a run needs to know of a kind of measurement.  The kinds are in :mod:`heavytop.features.kinds`.
+# The protocol of a kind of measurement for a run.  The kinds are in :mod:`heavytop.features.kinds`.
 
 
 Find = Callable[[str], Case]
@@ -335,22 +334,22 @@ class PlanTable(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
         raise NotImplementedError
 
     def swept(self, sweep: Sweep, cases: Sequence[Case]) -> Sequence[Case]:
-        """The cases that its tasks on a sweep are of: each, or others that hold many of them."""
+        """The cases of its tasks on a sweep: these, or others that combine many of them."""
         return cases
 
     def with_integrator(self, which: str | IntegratorSource) -> PlanTable | None:
-        """These measurements with that integrator in heyoka's place; None where heyoka is not measured."""
+        """These measurements with that integrator in place of heyoka; None where heyoka is not measured."""
         if getattr(self, "integrator", None) != HEYOKA:
             return None
         return msgspec.structs.replace(self, integrator=name_of(which))
 
 
 class MeasuredKind(Protocol):
-    """One kind of measurement, as far as it is run; what it does not say is the usual.
+    """One kind of measurement, for running it; the methods below are defaults.
 
-    name: in a plan and in the rows.  table: its table in a plan, tagged with the name; None where no plan asks for it.
-    concludes: whether all rows of the kind together come to more rows.
-    gathers: the files that :meth:`gather` writes, where its rows are parts of those of the report.
+    name: in a plan and in the rows.  table: its table in a plan, tagged with the name; None where no plan requests it.
+    concludes: whether further rows follow from all rows of the kind.
+    gathers: the files that :meth:`gather` writes, where its rows are combined into those of the report.
     """
 
     name: str
@@ -361,42 +360,42 @@ class MeasuredKind(Protocol):
     def measure(self, task: Task, saved: Saved) -> Row:
         """The row of ``task``; a run that fails is a row with its outcome.
 
-        saved: the place of an earlier, interrupted measurement of this row, and where this one keeps its own.
+        saved: the resume point of an earlier, interrupted measurement of this row, and of this one.
         Raises OutOfReach, Contradiction and PeerFailed, which are rows too.
         """
         ...
 
     def cost(self, task: Task) -> float:
-        """Seconds it may take, roughly: for the progress bar and for running long ones first.
+        """Estimated seconds: for the progress bar and for running long tasks first.
 
-        Those of one run of heyoka, and a second.
+        By default those of one run of heyoka, and a second.
         """
         return 1.0 + task.run_seconds
 
     def conclude(self, rows: Sequence[Row]) -> list[Row]:
-        """Further rows from all rows of the kind together; called where it :attr:`concludes`."""
+        """Further rows from all rows of the kind; called where it :attr:`concludes`."""
         return []
 
     def gather(self, rows: Callable[[], Iterator[tuple[Task, Row]]], folder: Path) -> list[Row]:
-        """The rows of the report, of all measured ones; called where it :attr:`gathers`, which go into the folder."""
+        """The rows of the report from all measured ones; called where it :attr:`gathers`, which go into the folder."""
         return []
 
 
 Kinds = Mapping[str, MeasuredKind]
 
 
-# One task measured, in whatever process: its row, and how a process begins that measures such.
+# The measurement of one task, in any process, and the start of a worker process.
 
 
 RESUME = "Finished rows are kept: run again with --resume"
 
 
 def measure(kind: MeasuredKind, task: Task, saved: Saved) -> Row:
-    """The row of ``task``, also where it cannot be known; raises InputError with its name for impossible data."""
+    """The row of ``task``, also where it fails or is aborted; raises InputError with its name for impossible data."""
     begin_row()
     try:
         task.require_reach()
-        return msgspec.structs.replace(_taken_up(kind, task, saved), data=data_of(task.case))
+        return msgspec.structs.replace(_resumed(kind, task, saved), data=data_of(task.case))
     except PeerFailed as error:
         return failed(task, error.cause)
     except (Unsupported, OutOfReach, Contradiction) as error:
@@ -405,8 +404,8 @@ def measure(kind: MeasuredKind, task: Task, saved: Saved) -> Row:
         raise InputError(f"{task.label}: {error.cause}", error.remedy) from None
 
 
-def _taken_up(kind: MeasuredKind, task: Task, saved: Saved) -> Row:
-    """The row, from its saved place on where that is a place of it: else it is measured from the beginning."""
+def _resumed(kind: MeasuredKind, task: Task, saved: Saved) -> Row:
+    """The row, resumed where that succeeds: else it is measured from the beginning."""
     try:
         return kind.measure(task, saved)
     except (OtherFlags, OutOfReach, Contradiction, PeerFailed, Unsupported):
@@ -424,10 +423,10 @@ def ended_its_process(task: Task, times: int, how: str = "") -> Row:
 
 
 def begin_worker(*_kinds: MeasuredKind) -> None:
-    """In a new process, which leaves interrupts to its parent.
+    """Prepares a new worker process, which leaves interrupts to its parent.
 
-    With the kinds all that measures was imported, heyoka without its converters.  None of it is garbage ever: it is not
-    looked at again.
+    Unpickling the kinds has imported every module that measures, heyoka without its converters; garbage collection
+    skips these objects from now on.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     extras.alone = True
@@ -435,7 +434,7 @@ def begin_worker(*_kinds: MeasuredKind) -> None:
 
 
 def died(task: Task, times: int) -> HeavyTopError:
-    """That a task of this program ended its process each time."""
+    """The error of a task of this program that ended its process each time."""
     return HeavyTopError(
         f"A worker process died {times} times during {task.label}.", f"{RESUME}, perhaps with fewer --workers."
     )

@@ -1,4 +1,4 @@
-"""Runs a plan: every row to disk as it is finished, what the rows of a kind come to together at the end."""
+"""Runs of a plan: each finished row is written to disk; conclusions from all rows of a kind follow at the end."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from heavytop.records import Row
 
 # Where tasks run: in this process, in local processes, or on a Dask cluster.  The rows are the same.
 #
-# At most four tasks a worker are under way at a time, so that a plan of any length takes no more memory than that.  A
+# At most four tasks per worker are submitted at a time, so that memory does not grow with the length of a plan.  A
 # worker is a process, whatever the number of its threads.
 
 
 _AHEAD = 4
 _ANSWER = 10.0
-"""Seconds that a Dask scheduler has to answer."""
+"""Seconds within which a Dask scheduler must answer."""
 _PATIENCE = 30
 """Seconds without any worker after which a cluster is abandoned."""
 _SAME = "Install the same versions on every machine."
 _one_task = Lock()
-"""A Dask worker with several threads measures one task at a time all the same: another beside it would spoil the
-timings, and another package's integrator need not bear threads.  Ensembles bring their own threads."""
+"""A Dask worker with several threads measures one task at a time: a second one would distort the timings, and a
+third-party integrator need not be thread-safe.  Ensembles start their own threads."""
 _PACKAGES = ("heavytop", "heyoka", "numpy", "mpmath", "gmpy2", "python-flint", "msgspec")
 
 Versions = dict[str, str]
 T = TypeVar("T")
 Timed = tuple[Row, float]
-"""A row, and the seconds that it took."""
+"""A row and its seconds."""
 
 
 @cache
@@ -60,18 +60,17 @@ def rows(
 ) -> Iterator[tuple[int, Row]]:
     """(index of the task, its row) as they finish, long ones started first; without those in ``done``.
 
-    saved: for the index of a task, where its row keeps its place; None where it keeps none, as on a cluster, which may
-    have no disk in common with this machine.
+    saved: from the index of a task to the resume point of its row; None without resume points, as on a cluster, which
+    may share no disk with this machine.
 
-    begun: called with a task that begins; on a cluster and with several workers, with one that is under way.
+    begun: called with a task that begins; on a cluster and with several workers, with one in progress.
     row_timeout: seconds of each row of a third-party integrator; None for limits by its other rows.
 
     Several workers are processes, and so is one where a task has a third-party integrator
-    (:mod:`heavytop.harness.limited`); on a cluster that task alone runs in a child of the worker, under the same limit.
+    (:mod:`heavytop.harness.limited`); on a cluster only that task runs in a child of the worker, under the same limit.
 
-    A task whose worker died is run again, three times in all; a third-party integrator that it ran is then a row that
-    failed.
-    Raises HeavyTopError with the name of the task that killed its worker each time, or where a cluster was lost;
+    A task whose worker died is run again, three times in all; that of a third-party integrator is then a failed row.
+    Raises HeavyTopError with the name of a task that killed its worker each time, and where a cluster was lost;
     InputError where the extra `cluster` is not installed, no scheduler answers, or a worker has other versions.
     """
     costs, waiting = in_order(tasks, kinds, done)
@@ -100,12 +99,12 @@ def _on_cluster(
         from distributed import KilledWorker
 
         pool = client.get_executor(pure=False)
-        same = versions()
+        expected = versions()
 
         def submit(index: int) -> Future[Timed]:
             task = tasks[index]
             limit = limits.seconds(task, costs[index]) if task.is_third_party else None
-            future: Future[Timed] = pool.submit(_measure_as, same, kinds[task.key.kind], task, limit)
+            future: Future[Timed] = pool.submit(_measure_as, expected, kinds[task.key.kind], task, limit)
             return future
 
         def at_once() -> int:
@@ -139,38 +138,40 @@ def _windowed(
     at_once: Callable[[], int],
     begun: Callable[[int], None],
 ) -> Iterator[tuple[int, Future[T]]]:
-    """Indices as they finish, with up to ``at_once()`` tasks under way; it is 0 where there are no workers.
+    """Indices as they finish, with up to ``at_once()`` tasks in progress; it is 0 where there are no workers.
 
-    begun: called with the task that is under way for longest, whenever that changes.
+    begun: called with the task longest in progress, whenever that changes.
     """
-    first, under_way = None, dict[Future[T], int]()
-    while queue or under_way:
+    reported, in_progress = None, dict[Future[T], int]()
+    while queue or in_progress:
         limit = at_once()
-        for _ in range(min(len(queue), max(limit, 1) - len(under_way))):
+        for _ in range(min(len(queue), max(limit, 1) - len(in_progress))):
             future = submit(queue[0])
-            under_way[future] = queue.popleft()
-        longest = next(iter(under_way.values()))
-        if longest != first:
-            begun(first := longest)
-        finished = wait(under_way, timeout=_PATIENCE, return_when=FIRST_COMPLETED).done
+            in_progress[future] = queue.popleft()
+        longest = next(iter(in_progress.values()))
+        if longest != reported:
+            begun(reported := longest)
+        finished = wait(in_progress, timeout=_PATIENCE, return_when=FIRST_COMPLETED).done
         if not finished and limit == 0:
             raise HeavyTopError(
                 "The cluster has lost all its workers.", f"Start some where heavytop is installed.  {RESUME}."
             )
         for future in finished:
-            yield under_way[future], future
-            del under_way[future]
+            yield in_progress[future], future
+            del in_progress[future]
 
 
 def _measure_as(expected: Versions, kind: MeasuredKind, task: Task, limit: float | None) -> Timed:
-    """The row of ``task`` and its seconds, within so many of them where there is a limit.
+    """The row of ``task`` and its seconds, at most ``limit`` where there is one.
 
     Raises InputError unless the versions here are those expected.
     """
     here = versions()
-    other = [f"{name} {here[name]} instead of {expected[name]}" for name in expected if here[name] != expected[name]]
-    if other:
-        raise InputError(f"A worker has {', '.join(other)}.", _SAME)
+    different = [
+        f"{name} {here[name]} instead of {expected[name]}" for name in expected if here[name] != expected[name]
+    ]
+    if different:
+        raise InputError(f"A worker has {', '.join(different)}.", _SAME)
     with _one_task:
         if limit is not None:
             return in_limited_process(kind, task, limit)
@@ -183,7 +184,7 @@ def _client(scheduler: str) -> Iterator[Any]:
     require_extra("cluster")
     import dask
 
-    # what goes wrong is said once, by the errors raised here
+    # the errors raised here report each failure once
     dask.config.set({"logging": {"distributed": "critical", "distributed.client": "critical"}})
     from distributed import Client
 
@@ -205,7 +206,7 @@ Progress = Callable[[Task], None]
 
 
 def unheard(task: Task) -> None:
-    """Progress that nobody follows."""
+    """Ignores progress."""
 
 
 def run(
@@ -218,10 +219,10 @@ def run(
     begun: Progress = unheard,
     row_timeout: float | None = None,
 ) -> list[Row]:
-    """Every row of the tasks into the checkpoint; returns only the rows drawn from them.
+    """Writes every row of the tasks into the checkpoint; returns only the rows concluded from them.
 
-    Rows that the checkpoint holds are not measured again.  ``progress`` hears of each task as it is done, ``begun`` as
-    it begins.  row_timeout: seconds of each row of a third-party integrator; None for limits by its other rows.
+    Rows in the checkpoint are not measured again.  ``progress`` is called with each task when it is done, ``begun``
+    when it begins.  row_timeout: seconds of each row of a third-party integrator; None for limits by its other rows.
     """
     for index in checkpoint.offsets:
         progress(tasks[index])
@@ -237,7 +238,7 @@ def run(
     for kind in kinds.values():
         if kind.concludes:
             indices = [index for index, task in enumerate(tasks) if task.key.kind == kind.name]
-            missing = [index for index in indices if index not in to_conclude]  # measured before it was resumed
+            missing = [index for index in indices if index not in to_conclude]  # measured before the run was resumed
             to_conclude |= zip(missing, checkpoint.rows(missing), strict=True)
             concluded += kind.conclude([to_conclude[index] for index in indices]) if indices else []
     return concluded

@@ -1,4 +1,4 @@
-"""The tables `[[sweep]]` of a plan: many tops under one name, each made only when its turn comes."""
+"""The tables `[[sweep]]` of a plan: many tops under one name, each made on demand."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _T = TypeVar("_T")
 
 
 class Lazy(Sequence[_T]):
-    """``size`` things, each made by ``make`` from its index when it is asked for; none is kept."""
+    """A sequence of ``size`` items, each made by ``make`` from its index on access; none is stored."""
 
     def __init__(self, size: int, make: Callable[[int], _T]) -> None:
         self._indices = range(size)
@@ -50,10 +50,10 @@ class Strict(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
 
 
 class SweepGrid(Strict, tag="grid"):
-    """Every combination of the values given; numbers as exact text.
+    """Every combination of the listed values; numbers as exact text.
 
     inertia, weight, centre, omega, gamma: one value, or a list of values.  A point is called NAME[i,j,...] by its
-    places in those that are lists, from 0, in this order; the last one changes fastest.
+    indices in the lists, from 0, in this order; the last one changes fastest.
     """
 
     inertia: list[str | list[str]]
@@ -65,7 +65,7 @@ class SweepGrid(Strict, tag="grid"):
     system: str | None = None
 
     def cases(self) -> Sequence[Case]:
-        """The points.  What is wrong with any of them is said now."""
+        """The points; raises InputError where any of them is invalid."""
         if self.system is not None:
             system(self.system)
         axes = [self._axis(what) for what in _AXES]
@@ -89,7 +89,7 @@ class SweepGrid(Strict, tag="grid"):
             top = HeavyTop(inertia, weight, centre, rotor)
             return Case(label(index), "from a grid", system_of(self.system, top), top, State(omega, gamma))
 
-        # the gyrostat asks for more than that each value be possible
+        # for the gyrostat valid values are not enough: the combinations are checked
         for index in _along_axes(shape) if self.system != GYROSTAT.name else range(size):
             with prefixed(f"The sweep's {label(index)}"):
                 for warning in require_possible(point(index)).top.warnings():
@@ -98,13 +98,13 @@ class SweepGrid(Strict, tag="grid"):
 
     @property
     def exact_data(self) -> str:
-        """How many values each quantity has, and a digest of all of them."""
+        """The number of values of each quantity, and a digest of all of them."""
         axes = [self._axis(what) for what in _AXES]
         digest = hashlib.sha256(str(axes).encode()).hexdigest()
         return f"grid of {' x '.join(str(len(axis)) for axis in axes)}, {digest[:16]}"
 
     def _axis(self, what: str) -> list[Any] | tuple[Any]:
-        """The values of one of the six: a list where the plan lists them, a tuple of one where it gives one."""
+        """The values of one quantity: a list where the plan lists them, a tuple of one for a single value."""
         values = getattr(self, what)
         if values is None:  # no rotor
             return (None,)
@@ -125,7 +125,7 @@ class Random(Strict, tag="random"):
 
     Moments of inertia that bodies can have: sums of two second moments, each from 1/2 to 5/2.  Weight from 1/2 to 5/2;
     centre and omega uniform in the cube from -1 to 1; gamma uniform on the sphere.
-    family: of what kind the tops are.
+    family: the class of the tops.
     """
 
     seed: int
@@ -138,14 +138,14 @@ class Random(Strict, tag="random"):
 
     @property
     def exact_data(self) -> str:
-        """All that the tops depend on, in words."""
+        """The parameters on which the tops depend, in words."""
         return f"{self.count} random tops, {self.family}, seed {self.seed}"
 
     def integers(self, index: int) -> tuple[int, ...]:
-        """Fourteen that make a motion: thousandths of the three moments, of the weight, of centre and omega; the three
-        numerators of gamma and their denominator.
+        """The fourteen integers of a motion: thousandths of the three moments, of the weight, of centre and omega; the
+        three numerators of gamma and their denominator.
         """
-        # of Python's generator, random() alone is promised to stay the same from version to version
+        # random() alone is guaranteed to be the same in all versions of Python
         draw = Generator(f"{self.seed}/{index}").random
 
         def thousandths() -> int:
@@ -195,6 +195,6 @@ def _bounded(name: str, size: int) -> int:
 
 
 def _along_axes(shape: Sequence[int]) -> Iterator[int]:
-    """Indices of the points with at most one place that is not the first."""
+    """Indices of the points with at most one index other than 0."""
     for k, size in enumerate(shape):
         yield from range(0, size * prod(shape[k + 1 :]), prod(shape[k + 1 :]))
