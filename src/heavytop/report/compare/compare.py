@@ -1,4 +1,4 @@
-"""Baseline against candidate, row by row and metric by metric."""
+"""Comparison of two reports, row by row and metric by metric."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ _VERSIONS = ("python", "implementation", "flint", "llvm", "cpu_target")
 class Differences:
     """All findings, and the differences of the plans and environments.
 
-    same: how many metrics are the same, where these are not among the findings.  sentences: what changed, at most
-    eight, the most telling first, and one for each survey with motions that got worse.  rows: those that changed, the
-    worst first.  changed: all findings but the same, the worst first.  motions: of each survey whose records were
+    same: the number of unchanged metrics that are not listed among the findings.  sentences: at most eight about the
+    changes, the most telling first, and one for each survey with motions that got worse.  rows: the changed ones, the
+    worst first.  changed: the findings other than same, the worst first.  motions: of each survey whose records were
     joined.
     """
 
@@ -49,7 +49,7 @@ class Differences:
 
     @property
     def tally(self) -> dict[Verdict, int]:
-        """How many findings of each verdict, the worst first and the same last."""
+        """The number of findings of each verdict, the worst first and the same last."""
         verdicts = [finding.verdict for finding in self.changed]
         same = self.same + len(self.findings) - len(self.changed)
         counts = {verdict: verdicts.count(verdict) for verdict in RANK} | {Verdict.SAME: same}
@@ -57,7 +57,7 @@ class Differences:
 
     @property
     def verdict(self) -> str:
-        """worse if anything is; else incomparable if anything is missing or incomparable; else better or same."""
+        """worse if any finding is; else incomparable if any is missing or incomparable; else better or same."""
         tally = self.tally
         if Verdict.WORSE in tally:
             return "worse"
@@ -89,10 +89,10 @@ def compare(
     list_same: bool = True,
     folders: tuple[Path, Path] | None = None,
 ) -> Differences:
-    """Every row of either report, in the baseline's order, new ones last.
+    """Compares every row of either report, in the baseline's order, new ones last.
 
-    list_same: False to count what plainly stayed the same in place of listing it.
-    folders: of both reports, whose rows are joined by motion where their kind keeps records of these.
+    list_same: False to count unchanged metrics in place of listing them.
+    folders: of both reports; rows of kinds with records of single motions are joined by motion.
     Raises InputError where neither report has a row, or the policy leaves nothing to compare.
     """
     findings_by_row: list[list[Finding]] = []
@@ -100,14 +100,14 @@ def compare(
     motions: list[WorseMotions | None] = []
     changes = Changes()
     timed = _timed(policy, baseline.environment, candidate.environment)
-    repeated = _alike(baseline.environment, candidate.environment)
+    repeated = _same_machine_and_versions(baseline.environment, candidate.environment)
     checked = isinstance(baseline, Brief), isinstance(candidate, Brief)
     if isinstance(baseline, Brief) and isinstance(candidate, Brief):
         candidate.rows.twins = baseline.rows
     rows = RowComparison(policy, kinds, timed, list_same, checked, repeated)
-    others = _Others(candidate.rows)
+    unmatched = _UnmatchedRows(candidate.rows)
     for row in baseline.rows:
-        match = others.take(identity := row.identity)
+        match = unmatched.take(identity := row.identity)
         if match is not None:
             findings_by_row.append(changes.add(row, match, rows.compare(identity, row, match)))
             if folders is not None and not rows.ignores(row):
@@ -117,10 +117,10 @@ def compare(
             lacking = Finding(identity, "", Verdict.MISSING, row.outcome, None, "the row is missing")
             findings_by_row.append([lacking])
     for index, row in missing:
-        if (match := others.take_elsewhere(row.identity)) is not None:
+        if (match := unmatched.take_elsewhere(row.identity)) is not None:
             findings_by_row[index] = rows.compare(row.identity, row, match)[:1]
         changes.add(row, match, findings_by_row[index])
-    for row in others.left():
+    for row in unmatched.left():
         if not rows.ignores(row):
             new = Finding(row.identity, "", Verdict.NEW, None, row.outcome)
             findings_by_row.append(changes.add(None, row, [new]))
@@ -129,7 +129,7 @@ def compare(
     if not findings and not rows.same:
         raise InputError("There is nothing to compare.", "Compare reports of `heavytop run` that have rows.")
     same = rows.same + sum(finding.verdict is Verdict.SAME for finding in findings)
-    planned = "seed" in baseline.plan | candidate.plan  # a score has none
+    planned = "seed" in baseline.plan | candidate.plan  # a score has no plan
     joined = [motion for motion in motions if motion is not None]
     return Differences(
         findings,
@@ -142,39 +142,39 @@ def compare(
     )
 
 
-class _Others:
-    """The rows of the candidate by their keys, taken as they come: two reports of one plan have the same order."""
+class _UnmatchedRows:
+    """The rows of the candidate, taken by identity in one pass: two reports of one plan have the same order."""
 
     def __init__(self, rows: Any) -> None:
         self._rows = rows
-        self._coming = enumerate(rows)
+        self._remaining = enumerate(rows)
         self._passed: dict[Identity, int] = {}
-        self._elsewhere: dict[Identity, list[Identity]] | None = None
+        self._by_elsewhere: dict[Identity, list[Identity]] | None = None
 
     def take(self, identity: Identity) -> Row | None:
         if identity in self._passed:
             row: Row = self._rows[self._passed.pop(identity)]
             return row
-        for number, row in self._coming:
+        for number, row in self._remaining:
             if row.identity == identity:
                 return row
             self._passed[row.identity] = number
         return None
 
     def take_elsewhere(self, identity: Identity) -> Row | None:
-        """The one row, of those that are left, that differs in its horizon alone; called when all are passed."""
-        if self._elsewhere is None:
-            self._elsewhere = {}
+        """The remaining row that differs in its horizon alone, if there is exactly one; called after the pass."""
+        if self._by_elsewhere is None:
+            self._by_elsewhere = {}
             for row in self._passed:
-                self._elsewhere.setdefault(row.elsewhere, []).append(row)
-        near = self._elsewhere.get(identity.elsewhere, [])
+                self._by_elsewhere.setdefault(row.elsewhere, []).append(row)
+        near = self._by_elsewhere.get(identity.elsewhere, [])
         return self.take(near.pop()) if len(near) == 1 else None
 
     def left(self) -> Iterator[Row]:
-        """Those that were not taken."""
+        """The rows that were not taken."""
         for number in self._passed.values():
             yield self._rows[number]
-        for _, row in self._coming:
+        for _, row in self._remaining:
             yield row
 
 
@@ -185,8 +185,8 @@ def _timed(policy: Policy, old: dict[str, Any], new: dict[str, Any]) -> bool:
     )
 
 
-def _alike(old: dict[str, Any], new: dict[str, Any]) -> bool:
-    """Whether processor and versions agree, that of this program apart, which is what is compared."""
+def _same_machine_and_versions(old: dict[str, Any], new: dict[str, Any]) -> bool:
+    """Whether processor and versions agree, apart from that of this program, which is being compared."""
     first, second = (
         {name: version for name, version in row.get("packages", {}).items() if name != "heavytop"} for row in (old, new)
     )
@@ -198,13 +198,13 @@ def _differences(old: dict[str, Any], new: dict[str, Any]) -> list[tuple[str, st
     flat_old, flat_new = dict(flatten(old)), dict(flatten(new))
     names = sorted(set(flat_old) | set(flat_new))
     pairs = ((n, flat_old.get(n, "absent"), flat_new.get(n, "absent")) for n in names)
-    return [(name, *_apart(a, b)) for name, a, b in pairs if a != b]
+    return [(name, *_differing_texts(a, b)) for name, a, b in pairs if a != b]
 
 
-def _apart(old: Any, new: Any) -> tuple[str, str]:
-    """Two entries that differ; of two lists what only one of them holds."""
+def _differing_texts(old: Any, new: Any) -> tuple[str, str]:
+    """The texts of two entries that differ; of two lists the items that only one has."""
     if isinstance(old, list) and isinstance(new, list):
-        only = ([part for part in one if part not in other] for one, other in ((old, new), (new, old)))
+        only = ([part for part in items if part not in excluded] for items, excluded in ((old, new), (new, old)))
         first, second = (" ".join(map(str, parts)) or "nothing else" for parts in only)
         return first, second
     first, second = (f"{len(entry)} known" if isinstance(entry, list) else str(entry) for entry in (old, new))
@@ -212,7 +212,7 @@ def _apart(old: Any, new: Any) -> tuple[str, str]:
 
 
 def flatten(block: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """The entries of an environment, those of inner blocks with the names before them."""
+    """The entries of an environment, those of inner blocks with dotted names."""
     for name, value in block.items():
         if isinstance(value, dict):
             yield from flatten(value, f"{prefix}{name}.")

@@ -1,4 +1,4 @@
-"""The changes between two reports, ranked: at most eight sentences, and a line a row.
+"""The changes between two reports, ranked: at most eight sentences, and a line per row.
 
 A sentence is made from the records of the two rows, never from another sentence.
 """
@@ -25,28 +25,28 @@ from heavytop.report.compare.verdicts import Verdict
 from heavytop.report.document.document import clip, integral_text, short
 
 MOST, _LONGEST, _CLIPPED = 8, 300, 20
-"""Sentences, characters of one, and those that say how long a clipped text is."""
+"""Most sentences, most characters of one, and the characters that give the length of a clipped text."""
 RANK = (Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING, Verdict.BETTER, Verdict.NEW, Verdict.SAME)
 """The verdicts, the worst first."""
 _ORDER_MOVED = 0.5
-"""An order between two settings that moved by less is not a finding: errors near rounding bend it by as much."""
+"""Least reported change of an order between two settings: errors near rounding change it by as much."""
 _DIGITS_MOVED = 0.1
-"""Digits right that moved by less are said to one place, and so not at all."""
+"""Least reported change of digits right, which are written with one decimal."""
 _ENDS_AS_BEFORE = 0.5
-"""Decades by which the error of the last state may have grown where the dense output alone is worse."""
+"""Decades by which the error of the last state may grow where only the dense output is worse."""
 _STEPS_MOVED = 0.02
-"""Decades: a step size control that rounds otherwise moves the steps by less."""
+"""Decades: different roundings in step size control change the steps by less."""
 _LESS = 0.5
-"""Part of the decades lost by the finest setting that a coarser one may lose where an error of lower order came."""
+"""Largest loss at coarser settings, as a fraction of that at the finest, for a new error of lower order."""
 _LOWER_ORDER = (
     "; coarser settings {}: the new error is of lower order than the method's, as of a coefficient or a "
     "stage in lower precision"
 )
-_MOST_KEPT = 20_000
-"""Rows whose numbers are held; further ones are counted, and named by their findings."""
+_MOST_HELD = 20_000
+"""Most rows held with their numbers; further ones are counted, and described by their findings alone."""
 _ERROR = ERRORS[0].text
 _DIGITS = (SOLUTION_ERROR, ERRORS[0].name)
-"""Quantities that the digits right sum up."""
+"""Quantities that the digits right summarize."""
 _WORDS = {
     "solution_error": "error",
     "local_error_ulp": "error of a step in eps",
@@ -67,9 +67,9 @@ _COMPONENTS = {
 
 
 class Change(NamedTuple):
-    """A row that is not the same in both reports.  old, new: None where only one report has it.
+    """A row that changed.  old, new: None where a report does not have it.
 
-    findings: all that are not the same, the worst first; never empty.
+    findings: all with a verdict other than same, the worst first; never empty.
     """
 
     identity: Identity
@@ -79,7 +79,7 @@ class Change(NamedTuple):
 
     @property
     def verdict(self) -> Verdict:
-        """The worst of its findings."""
+        """The verdict of its worst finding."""
         return self.findings[0].verdict
 
     @property
@@ -90,7 +90,7 @@ class Change(NamedTuple):
 
     @property
     def lost(self) -> float:
-        """Digits lost; of errors of other kinds the decades of the largest loss."""
+        """Digits lost; without digits right the decades of the largest loss."""
         if self.digits is not None:
             return self.digits[0] - self.digits[1]
         return max(
@@ -98,7 +98,7 @@ class Change(NamedTuple):
         )
 
     def decades(self, name: str) -> float | None:
-        """Decades by which the error of that name grew; None for another metric, and where one is not a number."""
+        """Decades by which the error of that name grew; None for other metrics, and where either is not a number."""
         old, new = (self.metric(row, name) for row in (self.old, self.new))
         if old is None or new is None or old.log10 is None or new.log10 is None or old.kind != "error":
             return None
@@ -106,7 +106,7 @@ class Change(NamedTuple):
 
     @staticmethod
     def metric(row: Row | None, name: str) -> Metric | None:
-        """The metric of that name, if the row is there and has it."""
+        """The metric of that name; None where the row or the metric is missing."""
         return None if row is None else row.metrics.get(name)
 
     @property
@@ -116,7 +116,7 @@ class Change(NamedTuple):
         return max((moved for moved in worse if moved is not None), default=0.0)
 
     def about(self, finding: Finding) -> Quantity | None:
-        """The quantity that a metric or series is about, without its statistic; None for laws, seconds, whole rows."""
+        """The quantity of a metric or series, without its statistic; None for laws, seconds, whole rows."""
         quantity = self.measured(finding)
         return quantity and quantity.over("")
 
@@ -131,7 +131,7 @@ class Change(NamedTuple):
 
 
 class SettingPoint(NamedTuple):
-    """One setting of an integrator on one case: log10 of its steps and of its error, in the two reports."""
+    """One setting of an integrator on one case: log10 of its steps and of its error, in both reports."""
 
     steps: tuple[float, float]
     errors: tuple[float, float]
@@ -139,10 +139,10 @@ class SettingPoint(NamedTuple):
 
 @dataclass(slots=True)
 class Changes:
-    """Gathers what a comparison finds, pair by pair.
+    """The changes between two reports, collected row by row.
 
-    yardstick: what changed of heyoka where the baseline measures it beside a third-party integrator, which it is no
-    verdict on.
+    yardstick: changes of heyoka where the baseline measures it beside a third-party integrator: no verdict on the
+    latter.
     """
 
     rows: list[Change] = field(default_factory=list)
@@ -151,14 +151,14 @@ class Changes:
     _third_party: bool = False
 
     def add(self, old: Row | None, new: Row | None, findings: list[Finding]) -> list[Finding]:
-        """Take in the findings about one row, in one report or in both; returns them as they are."""
+        """Adds the findings about one row, of one report or of both, and returns them unchanged."""
         if old is not None and not self._third_party:
             subject = old.key.subject
             self._third_party = subject.what == "computed" and is_third_party(subject.name)
         changed = [finding for finding in findings if finding.verdict is not Verdict.SAME]
         if changed:
             changed.sort(key=lambda finding: RANK.index(finding.verdict))
-            before, after = (old, new) if len(self.rows) < _MOST_KEPT else (None, None)
+            before, after = (old, new) if len(self.rows) < _MOST_HELD else (None, None)
             self.rows.append(Change(changed[0].row, _without_samples(before), _without_samples(after), changed))
         if old is not None and new is not None:
             self._point(old, new)
@@ -174,10 +174,10 @@ class Changes:
             self.points.setdefault(key, []).append(SettingPoint(steps, (before.log10, after.log10)))
 
     def excused(self) -> Callable[[Finding], bool]:
-        """Which findings are no verdict; their rows are taken out.
+        """Removes excused findings from the rows, and returns the test for them.
 
-        Slight losses of an integrator that gained more than these: of two methods of which each is slightly better
-        somewhere, that with the largest loss is worse.  And what changed of heyoka beside a third-party integrator.
+        Excused are slight losses of an integrator with larger gains: of two methods, each slightly better somewhere,
+        the one with the largest loss is worse.  And changes of heyoka beside a third-party integrator.
         """
         gained: dict[tuple[str, str], float] = {}
         lost: dict[tuple[str, str], float] = {}
@@ -187,23 +187,25 @@ class Changes:
                     side, moved = (lost if finding.slight else gained), change.decades(finding.metric)
                     side[finding.method] = max(side.get(finding.method, 0.0), math.inf if moved is None else abs(moved))
 
-        def is_mended(finding: Finding) -> bool:
+        def is_compensated(finding: Finding) -> bool:
             return finding.slight and gained.get(finding.method, 0.0) > lost[finding.method]
 
         def is_yardstick(finding: Finding) -> bool:
             return self._third_party and finding.of_yardstick
 
-        rows = (c._replace(findings=[finding for finding in c.findings if not is_mended(finding)]) for c in self.rows)
+        rows = (
+            c._replace(findings=[finding for finding in c.findings if not is_compensated(finding)]) for c in self.rows
+        )
         verdicts = [change for change in rows if change.findings]
         self.yardstick = [change for change in verdicts if is_yardstick(change.findings[0])]
         self.rows = [change for change in verdicts if not is_yardstick(change.findings[0])]
-        return lambda finding: is_mended(finding) or is_yardstick(finding)
+        return lambda finding: is_compensated(finding) or is_yardstick(finding)
 
     def coarser(self, change: Change) -> str:
-        """``are the same`` or ``lost less`` where the finest setting of an integrator on a case lost most, in as many
+        """``are the same`` or ``lost less`` where the finest setting of an integrator on a case lost most, with equal
         steps; else empty.
 
-        What it has lost by then falls more slowly than the method's own error, which is larger at the others.
+        Such a new error decreases more slowly than the error of the method, which hides it at coarser settings.
         """
         curve = _curve(change.identity)
         points, changed = (
@@ -230,16 +232,16 @@ class Changes:
 
 
 class Sentence(NamedTuple):
-    """One sentence, and the rows that it speaks of."""
+    """One sentence, and the rows that it describes."""
 
     text: str
     rows: frozenset[Identity]
 
 
 def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[str]:
-    """At most eight sentences, the most telling first; what is worse before what is better.
+    """At most eight sentences, the most important first; losses before gains.
 
-    same: how many metrics are the same, each row that was aborted in both reports counted as one.
+    same: the number of unchanged metrics, where a row aborted in both reports counts as one.
     failed: rows that failed in both reports, in the same way.
     """
     if not changes.rows:
@@ -255,25 +257,25 @@ def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[s
         for make in (_digits_moved, _steps_moved, _laws_moved, partial(_others_moved, changes)):
             ranked += make(rows, verdicts)
     ranked += [sentence for moved, sentence in orders if moved > 0]
-    still, beside = _still_failed(failed), _yardstick(changes)
-    ranked = [*ranked, *_whole_rows(changes.rows, Verdict.BETTER, Verdict.NEW)][: MOST - 1 - len(still) - len(beside)]
+    still, scale = _still_failed(failed), _yardstick(changes)
+    ranked = [*ranked, *_whole_rows(changes.rows, Verdict.BETTER, Verdict.NEW)][: MOST - 1 - len(still) - len(scale)]
     named = frozenset[Identity]().union(*(group.rows for group in ranked))
-    rest = [change for change in changes.rows if change.identity not in named]
-    end = f"{plural(len(rest), 'other row')} changed." if rest else "No other row changed."
+    unnamed = [change for change in changes.rows if change.identity not in named]
+    end = f"{plural(len(unnamed), 'other row')} changed." if unnamed else "No other row changed."
     if not same and all(change.verdict in (Verdict.MISSING, Verdict.NEW) for change in changes.rows):
         keys = {msgspec.structs.replace(change.identity.key, case="") for change in changes.rows}
         names = " and ".join(_case(change.identity) for change in changes.rows)
-        asked = (
+        advice = (
             f"Only the names differ: {names}. Rows of the same name (`# name:` of a trajectory) are compared."
             if (len(keys), len(changes.rows)) == (1, 2)
             else "Were they made with the same plan?"
         )
-        end = f"The two have no row in common. {asked}"
-    return [clip(text, _LONGEST) for text in (*(group.text for group in ranked), *still, end, *beside)]
+        end = f"The two have no row in common. {advice}"
+    return [clip(text, _LONGEST) for text in (*(group.text for group in ranked), *still, end, *scale)]
 
 
 def _yardstick(changes: Changes) -> list[str]:
-    """A sentence that heyoka changed, which stands beside for scale; none where it did not."""
+    """A sentence about changes of heyoka, measured for scale; none without changes."""
     if not changes.yardstick:
         return []
     first = min(changes.yardstick, key=lambda change: RANK.index(change.verdict))
@@ -290,7 +292,7 @@ def _still_failed(rows: Sequence[Row]) -> list[str]:
 
 
 def _why(row: Row) -> str:
-    """The end of a row: the reason that its integrator gives, or its outcome and how far it came."""
+    """The reason that the integrator gives for a failure, or the outcome and the time reached."""
     if row.outcome == FAILED:
         return row.reference.reason
     stopped = f"at t = {short(row.time_reached)} of {short(row.horizon)}"
@@ -298,7 +300,7 @@ def _why(row: Row) -> str:
 
 
 def line(change: Change) -> str:
-    """The change of one row in a few words: digits lost or gained, else its largest change for the worse."""
+    """The change of one row in short: digits lost or gained, else its largest change for the worse."""
     worst = max(
         change.findings, key=lambda finding: (-RANK.index(finding.verdict), change.decades(finding.metric) or -math.inf)
     )
@@ -316,7 +318,7 @@ def line(change: Change) -> str:
 
 
 def folded(change: Change) -> Iterator[tuple[str, list[Finding]]]:
-    """The findings of a row by quantity, largest, rms, last value and series of one thing together; worst first."""
+    """The findings of a row grouped by quantity, its largest, rms and last value and series together; worst first."""
     together: dict[tuple[Verdict, str], list[Finding]] = {}
     for finding in change.findings:
         quantity = change.about(finding)
@@ -337,7 +339,7 @@ def statistics(change: Change, name: str, findings: Sequence[Finding]) -> str:
 
 
 def _without_samples(row: Row | None) -> Row | None:
-    """A row whose series say only what they are about: sentences need no more, and they are most of its size."""
+    """The row with empty series, which make up most of its size: sentences need only their quantities."""
     if row is None or not row.series:
         return row
     series = {name: Series([], [], series.quantity) for name, series in row.series.items()}
@@ -345,7 +347,7 @@ def _without_samples(row: Row | None) -> Row | None:
 
 
 def _digits(row: Row | None) -> float | None:
-    """Digits right, or those of the largest error where a row has no relative one."""
+    """Digits right; by the largest absolute error where a row has no relative one."""
     if row is None:
         return None
     if (kept := digits_kept(row)) is not None:
@@ -355,7 +357,7 @@ def _digits(row: Row | None) -> float | None:
 
 
 def _curve(row: Identity) -> tuple[str, str, str]:
-    """Case, integrator and format: what the settings of one work-precision curve share."""
+    """Case, integrator and format, which identify one work-precision curve."""
     return row.case, row.key.subject.name, row.key.precision
 
 
@@ -383,7 +385,7 @@ def _whose(rows: Sequence[Identity]) -> str:
 
 
 def _orders(changes: Changes) -> Iterator[tuple[float, Sentence]]:
-    """By how much the order that single steps or refined settings show moved, the largest change of each integrator."""
+    """Change and sentence of the largest change of the observed order, for each integrator."""
     largest: dict[str, tuple[float, Sentence]] = {}
     for name, moved, sentence in chain(_orders_of_steps(changes), _orders_of_settings(changes)):
         if name not in largest or abs(moved) > abs(largest[name][0]):
@@ -395,7 +397,7 @@ _SHOW_ORDER = {OBSERVED_ORDER: "single steps", ORDER_OF_RUNS: "whole runs"}
 
 
 def _orders_of_steps(changes: Changes) -> Iterator[tuple[str, float, Sentence]]:
-    """Integrator, change and sentence, of the order that single steps or whole runs show."""
+    """Integrator, change and sentence for orders observed in single steps or whole runs."""
     for change, (order, shown_by) in product(changes.rows, _SHOW_ORDER.items()):
         metrics = [change.metric(row, order.text) for row in (change.old, change.new)]
         before, after = (math.nan if metric is None else float(metric) for metric in metrics)
@@ -405,7 +407,7 @@ def _orders_of_steps(changes: Changes) -> Iterator[tuple[str, float, Sentence]]:
 
 
 def _orders_of_settings(changes: Changes) -> Iterator[tuple[str, float, Sentence]]:
-    """Integrator, change and sentence, of −Δ log error/Δ log steps between one setting and the next finer one."""
+    """Integrator, change and sentence for −Δ log error/Δ log steps between one setting and the next finer one."""
     changed: dict[tuple[str, str, str], set[Identity]] = {}
     for row in (change.identity for change in changes.rows):
         changed.setdefault(_curve(row), set()).add(row)
@@ -425,7 +427,7 @@ def _orders_of_settings(changes: Changes) -> Iterator[tuple[str, float, Sentence
 
 
 def _explained(changes: Changes) -> Iterator[Sentence]:
-    """The explanations of states that are far off now and were not: of each integrator that of most rows."""
+    """New explanations of large errors: for each integrator the one of most rows."""
     by_integrator: dict[str, dict[str, list[tuple[str, Identity]]]] = {}
     for change in changes.worst_first:
         new, old = (row.explained if row else msgspec.UNSET for row in (change.new, change.old))
@@ -434,8 +436,8 @@ def _explained(changes: Changes) -> Iterator[Sentence]:
             kinds.setdefault(new.kind, []).append((new.text, change.identity))
     for kinds in by_integrator.values():
         cases = max(kinds.values(), key=len)
-        (text, first), also = cases[0], len(cases) - 1
-        more = f" and {plural(also, 'other row')}" if also else ""
+        (text, first), others = cases[0], len(cases) - 1
+        more = f" and {plural(others, 'other row')}" if others else ""
         where_seen = f" Seen on {_where(first)}{more}."
         room = _LONGEST - len(where_seen)
         while len(text) > room and ". " in text:
@@ -445,31 +447,29 @@ def _explained(changes: Changes) -> Iterator[Sentence]:
 
 
 def _whole_rows(rows: Sequence[Change], *verdicts: Verdict) -> Iterator[Sentence]:
-    """Rows that failed, cannot be compared, are missing or new: one sentence for what became of them, its commonest
-    reason named.
-    """
+    """One sentence, with the commonest reason, for all rows that failed, are incomparable, missing, or new."""
     by_fate: dict[str, list[tuple[str, Change]]] = {}
     for change in rows:
         if change.verdict in verdicts and not change.findings[0].metric:
-            became, reason = _became(change)
-            by_fate.setdefault(became, []).append((reason, change))
-    for became, cases in by_fate.items():
+            fate, reason = _fate(change)
+            by_fate.setdefault(fate, []).append((reason, change))
+    for fate, cases in by_fate.items():
         reason, _ = Counter(reason for reason, _ in cases).most_common(1)[0]
         cases.sort(key=lambda case: case[0] != reason)
         named = [change.identity for _, change in cases]
-        whose, on = _whose(named), _on(named) if became in _NAMED else ""
+        whose, on = _whose(named), _on(named) if fate in _WITH_EXAMPLE else ""
         if len(cases) == 1:
-            became = became.replace("are ", "is ").replace("stop ", "stops ")
-        text = f"{plural(len(cases), 'row')}{whose} {became}{on}"
+            fate = fate.replace("are ", "is ").replace("stop ", "stops ")
+        text = f"{plural(len(cases), 'row')}{whose} {fate}{on}"
         yield Sentence(f"{text}{': ' if reason else ''}{clip(reason, 160)}.", frozenset(named))
 
 
-_NAMED = ("failed", "stop earlier", "are worse", "are better")
-"""Fates of rows where the sentence says of which."""
+_WITH_EXAMPLE = ("failed", "stop earlier", "are worse", "are better")
+"""Fates of rows for which the sentence names a row."""
 
 
-def _became(change: Change) -> tuple[str, str]:
-    """The fate of a row as a whole, and why."""
+def _fate(change: Change) -> tuple[str, str]:
+    """The fate of a whole row, and the reason."""
     if change.verdict is Verdict.MISSING:
         return "are missing", ""
     if change.verdict is Verdict.NEW:
@@ -485,7 +485,7 @@ def _became(change: Change) -> tuple[str, str]:
 
 
 def _digits_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:
-    """Digits right: the largest change of each integrator, and on how many other rows they moved the same way."""
+    """Digits right: the largest change of each integrator, and the number of other rows that moved the same way."""
     sign = -1.0 if Verdict.BETTER in verdicts else 1.0
     moved = [c for c in rows if c.findings[0].metric and c.digits is not None and sign * c.lost >= _DIGITS_MOVED]
     for changes in _by_integrator(moved):
@@ -502,7 +502,7 @@ def _digits_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Se
 
 
 def _steps_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:
-    """Other steps at the same setting: the largest change of each integrator."""
+    """Changes of steps at the same setting: the largest of each integrator."""
     moved = [c for c in rows if c.old is not None and c.new is not None and c.old.steps and c.new.steps]
     moved = [c for c in moved if abs(_steps(c)) > _STEPS_MOVED]
     for changes in _by_integrator(moved):
@@ -514,14 +514,14 @@ def _steps_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sen
 
 
 def _steps(change: Change) -> float:
-    """log10 of by how much the steps grew."""
+    """log10 of the growth of the steps."""
     assert change.old is not None
     assert change.new is not None
     return math.log10(change.new.steps / change.old.steps)
 
 
 def _ends_as_before(change: Change) -> bool:
-    """Whether of a computed row whose digits fell the last state is as right as it was: files do not say steps."""
+    """Whether the error of the last state of a computed row did not grow; False for files, whose steps are unknown."""
     if change.old is None or change.old.key.subject.what != "computed":
         return False
     measured = ((name, metric.quantity) for name, metric in change.old.metrics.items())
@@ -531,7 +531,7 @@ def _ends_as_before(change: Change) -> bool:
 
 
 def _laws_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:
-    """Growth laws that moved: one sentence for each quantity and integrator, the first motion named."""
+    """Growth laws that changed: one sentence for each quantity and integrator, with the first motion."""
     rows_of: dict[tuple[str, str, str], list[Change]] = {}
     for change in rows:
         for finding in change.findings:
@@ -549,7 +549,7 @@ def _laws_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sent
 
 
 def _law_moved(old: Law, new: Law, reason: str) -> str:
-    """``grows like t (was t^0.5)``; of the same class its exponent and why it counts."""
+    """``grows like t (was t^0.5)``; within a class the exponents and the reason."""
     if old.growth != new.growth:
         return f"grows {_GROWS.get(new.growth, f'like {new.growth}')} (was {_GROWS.get(old.growth, old.growth)})"
     exponents = [f"{law.exponent:.3g}" for law in (old, new) if law.exponent is not None]
@@ -557,7 +557,7 @@ def _law_moved(old: Law, new: Law, reason: str) -> str:
 
 
 def _quantity(quantity: Quantity | None, name: str) -> str:
-    """``error along the flow``, ``drift of the energy``; the key where it has no words."""
+    """``error along the flow``, ``drift of the energy``; the key of an unknown quantity."""
     if quantity is None:
         return clip(name, 60)
     what = _WORDS.get(quantity.name, quantity.name.replace("_", " "))
@@ -566,12 +566,12 @@ def _quantity(quantity: Quantity | None, name: str) -> str:
 
 
 def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:
-    """Drifts, escape times, errors of steps, seconds: the largest change of each quantity and integrator."""
+    """Drifts, escape times, local errors, seconds: the largest change of each quantity and integrator."""
     by_quantity: dict[tuple[str, str], list[tuple[float, Change, Finding]]] = {}
     for change in rows:
         for _, findings in folded(change):
             worst, quantity = findings[0], change.about(findings[0])
-            if worst.verdict in verdicts and not _told_elsewhere(change, worst, quantity):
+            if worst.verdict in verdicts and not _is_covered(change, worst, quantity):
                 name = quantity.name if quantity else worst.name
                 size = change.decades(worst.metric) or 0.0
                 by_quantity.setdefault((change.identity.key.subject.name, name), []).append((abs(size), change, worst))
@@ -590,8 +590,8 @@ def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdic
         yield Sentence(f"{what[0].upper()}{what[1:]}{values} on {_where(change.identity)}{why}{also}{below}.", together)
 
 
-def _told_elsewhere(change: Change, finding: Finding, quantity: Quantity | None) -> bool:
-    """Whether other sentences say it: whole rows, laws, orders, and what the digits right sum up."""
+def _is_covered(change: Change, finding: Finding, quantity: Quantity | None) -> bool:
+    """Whether another sentence covers a finding: on whole rows, laws, orders, or digits right."""
     if not finding.metric or finding.of == "growth" or finding.metric in {order.text for order in _SHOW_ORDER}:
         return True
     if change.digits is None or abs(change.lost) < _DIGITS_MOVED:

@@ -1,11 +1,11 @@
-"""How much of a noise band a comparison allows, and when a candidate is noisier by more than chance.
+"""Noise bands in a comparison: the loss that they allow, and candidates noisier by more than chance.
 
-What is allowed comes from the baseline: a candidate must not excuse itself.  And a band excuses no loss beyond what
+The allowed loss follows from the baseline: a candidate must not excuse itself.  And no band excuses a loss larger than
 step control makes of a rounding, unless rounding explains it.
 
-A band is itself an estimate from 16 runs, or from the starts of an ensemble.  Of bands of two such estimates one is
-wider than the other by at most 4.2 (drift), 4.4 (growth) and 5.7 (homoclinic, where one random amplitude decides
-everything) in 175,000 pairs: `validation/false_alarms.py`.  Each kind's ``noise_factor`` is above that.
+A band is itself an estimate from 16 runs, or from the starts of an ensemble.  The ratio of two such estimates is at
+most 4.2 (drift), 4.4 (growth) and 5.7 (homoclinic, where one random amplitude decides everything) in 175,000 pairs:
+`validation/false_alarms.py`.  Each kind's ``noise_factor`` is above that.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from heavytop.top.amplification import FOLLOWED, amplification, rate
 from heavytop.top.equations import Parameters, System, holding, largest, system
 from heavytop.top.heavy_top import HeavyTop, State
 
-# When two numbers count as the same: defaults, or a TOML file of rules.  docs/compare.md shows every key.
+# Policies: when two numbers count as the same, by default or by a TOML file of rules.  docs/compare.md shows every key.
 
 
 BITS = math.log10(2)
 """Decades in one bit."""
 _LOSS = 2 * BITS
-"""By how much an error may grow where the policy does not say."""
+"""Allowed growth of an error where the policy gives none."""
 _TENTH = math.log10(1.1)
-"""Growth that is allowed of an error of truncation, which every machine makes the same."""
+"""Allowed growth of a truncation error, which is the same on every machine."""
 _REMEDY = "`heavytop docs compare` shows every key of a policy."
 
 
@@ -47,10 +47,9 @@ class Allowance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The allowance of one metric.  Numbers are exact text or TOML numbers; unset ones are taken from the whole policy.
 
     floor: errors below floor·eps of the row's format are all the same.
-    loss_bits or loss_digits: an error may grow by that much; where neither is given by 2 bits, one of truncation by a
-    tenth.
-    noise: and by that many times its noise band, where the rows hold one; 0 for no band.
-    duration: a duration may shrink by that fraction.  value: a value that must agree may be off by that fraction.
+    loss_bits or loss_digits: allowed growth of an error; by default 2 bits, for a truncation error a tenth.
+    noise: allowed growth in units of the noise band, where the rows have one; 0 ignores bands.
+    duration: fraction by which a duration may shrink.  value: relative difference allowed for a value that must agree.
     """
 
     floor: str | float | None = None
@@ -71,7 +70,7 @@ class Allowance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Rule(Allowance, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """An allowance for the metrics whose measure, case and name match these glob patterns; the first match counts.
 
-    ignore: such metrics are left out.  limit: an error above it is worse, a duration below it too, whatever was before.
+    ignore: such metrics are left out.  limit: a larger error, or a shorter duration, is worse whatever the baseline.
     """
 
     measure: str = "*"
@@ -89,10 +88,10 @@ class Rule(Allowance, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class Timings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Seconds compare never, between runs of one machine, or always.  They may grow by ``ratio``; below ``floor``
-    seconds all are the same.
+    """Whether seconds are compared: never, between runs of one machine, or always.  They may grow by ``ratio``; below
+    ``floor`` seconds all are the same.
 
-    Those of a plan with ``timings = true`` compare wherever processor and versions agree, without a floor.
+    Those of a plan with ``timings = true`` are compared wherever processor and versions agree, without a floor.
     """
 
     compare: Literal["never", "same-machine", "always"] = "never"
@@ -122,8 +121,8 @@ class Policy(Allowance, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class Limits(msgspec.Struct, frozen=True):
-    """The numbers that decide about one metric, in decades: log10 of the floor in eps, allowed loss, the same of an
-    error that is truncation, factor of the band; fractions of durations and values; log10 of the limit; ignored or not.
+    """The limits of one metric, in decades: log10 of the floor in eps; allowed loss, also of a truncation error;
+    factor of the band; fractions of durations and values; log10 of the limit; whether it is ignored.
     """
 
     floor: float
@@ -137,7 +136,7 @@ class Limits(msgspec.Struct, frozen=True):
 
 
 class Lookup:
-    """The limits of each metric of a policy, each looked up once.  usual: of what no rule is about."""
+    """The limits of each metric under a policy, cached.  usual: those of metrics without a rule."""
 
     def __init__(self, policy: Policy) -> None:
         self.usual = _limits(Rule(), policy)
@@ -145,13 +144,13 @@ class Lookup:
         self._known: dict[tuple[str, str, str], Limits] = {}
 
     def __call__(self, measure: str, case: str, metric: str) -> Limits:
-        """The limits of a metric: those of the first rule that is about it."""
+        """The limits of a metric: those of the first rule that matches it."""
         if not self._rules:
             return self.usual
         key = measure, case, metric
         if key not in self._known:
-            about = (each for *patterns, each in self._rules if all(map(re.Pattern.fullmatch, patterns, key)))
-            self._known[key] = next(about, self.usual)
+            matching = (limits for *patterns, limits in self._rules if all(map(re.Pattern.fullmatch, patterns, key)))
+            self._known[key] = next(matching, self.usual)
         return self._known[key]
 
 
@@ -168,7 +167,7 @@ def load(path: Path) -> Policy:
 
 
 def adjusted(policy: Policy, floor: str | None = None, loss_bits: str | None = None) -> Policy:
-    """The policy with another floor or loss for what no rule is about; raises InputError for a negative one."""
+    """The policy with another floor or loss for metrics without a rule; raises InputError for a negative one."""
     if floor is not None:
         policy = msgspec.structs.replace(policy, floor=floor)
     if loss_bits is not None:
@@ -178,8 +177,8 @@ def adjusted(policy: Policy, floor: str | None = None, loss_bits: str | None = N
 
 def _limits(rule: Rule, policy: Policy) -> Limits:
     def number(name: str) -> float:
-        own = getattr(rule, name)
-        return float(exact(getattr(policy, name) if own is None else own))
+        of_rule = getattr(rule, name)
+        return float(exact(getattr(policy, name) if of_rule is None else of_rule))
 
     digits, bits = rule.loss_digits, rule.loss_bits
     if digits is None and bits is None:
@@ -219,30 +218,30 @@ def glob(pattern: str) -> re.Pattern[str]:
 
 # The largest error that rounding explains in a row, from the row's own body, start and horizon.
 #
-# The roundings of n steps walk at random, the body turns on meanwhile, and the motion amplifies what there is.  So in
-# units of the quantity an error is rounding noise up to
+# The roundings of n steps add up like a random walk, while the body rotates and the motion amplifies the error.  So in
+# units of the quantity an error may be rounding noise up to
 #
 #     100 · eps · √max(n, τ) · max(τ, A),    τ = 1 + rate · |horizon|,
 #
-# which is 100 · eps · τ^1.5 on a regular motion followed with one step per unit of its own time, and more by the
-# amplification A (:mod:`heavytop.top.amplification`) beyond τ.  A is computed from the data of the row, only where the
-# rest does not suffice.  The drift of a first integral neither turns on nor is amplified: 100 · eps · √max(n, τ).
+# which is 100 · eps · τ^1.5 on a regular motion with one step per unit of its own time, and more by the amplification A
+# (:mod:`heavytop.top.amplification`) beyond τ.  A is computed from the data of the row, only where the other factors do
+# not suffice.  The drift of a first integral neither rotates nor is amplified: 100 · eps · √max(n, τ).
 
 
 MARGIN = 2.0
-"""Decades above what the roundings of a run amount to on average."""
-_FASTER = 0.5
-"""A chaotic motion that double does not follow may be amplified faster by such a part than until there."""
+"""Decades above the mean size of the accumulated roundings of a run."""
+_EXCESS_RATE = 0.5
+"""Fraction by which the rate of amplification of a chaotic motion may exceed its mean beyond the reach of double."""
 _DRIFT = "drift"
 _RELATIONS = ("hess", "goryachev_chaplygin")
-"""Conserved on one level set alone: the motion amplifies what leaves it."""
+"""Conserved on one level set alone: the motion amplifies deviations from it."""
 
 
 class RoundingBound:
-    """How large rounding can make the errors of a row, each as log10.
+    """Bounds of the rounding errors of a row, as log10.
 
-    row: of the side of a comparison that is trusted.  Without body and start its rate counts as 1, and its
-    amplification as what the row itself says.
+    row: of the trusted side of a comparison, the baseline.  Without body and start its rate counts as 1, and its
+    amplification is the one stated in the row.
     """
 
     def __init__(self, row: Row, kind: ReportedKind) -> None:
@@ -250,22 +249,22 @@ class RoundingBound:
         self.kind = kind
 
     def explains(self, quantity: Quantity | None, size: float) -> bool:
-        """Whether rounding makes an error of that quantity, or a difference of two, as large as 10^size."""
-        roundings = max(self._turns, float(self.row.steps))
+        """Whether rounding explains an error of that quantity, or a difference of two, of size 10^size."""
+        roundings = max(self._tau, float(self.row.steps))
         bound = MARGIN + (1 - self.row.bits) * BITS + math.log10(roundings) / 2 + self._unit(quantity)
         if quantity is not None and quantity.name == _DRIFT and quantity.component not in _RELATIONS:
             return size <= bound
-        bound += math.log10(self._turns)
+        bound += math.log10(self._tau)
         if size <= bound:
             return True
         amplified = min(self._amplified(self.row.horizon), math.log10(self.kind.largest_amplification))
-        return size <= bound + max(0.0, amplified - math.log10(self._turns))
+        return size <= bound + max(0.0, amplified - math.log10(self._tau))
 
     def explains_times(self, time: str, part: float) -> bool:
-        """Whether rounding moves an escape at ``time`` by that part of it.
+        """Whether rounding explains that an escape at ``time`` comes earlier by that fraction of it.
 
-        An error that grows like the amplification A(t), about e^(rate t), comes to a threshold earlier by ln(100)/rate
-        where it is 100 times as large; one is up to 100 times larger than usual, another as much smaller.
+        An error that grows like the amplification A(t), about e^(rate t), reaches a threshold earlier by ln(100)/rate
+        where it is 100 times as large; one may be 100 times larger than the mean, another 100 times smaller.
         """
         return part * self._amplified(time) <= 2 * MARGIN
 
@@ -293,7 +292,7 @@ class RoundingBound:
         return Fraction(1) if self._motion is None else rate(*self._motion)
 
     @cached_property
-    def _turns(self) -> float:
+    def _tau(self) -> float:
         return 1 + float(min(self._rate * abs(exact(self.row.horizon)), Fraction(10**300)))
 
     def _amplified(self, horizon: str) -> float:
@@ -301,7 +300,7 @@ class RoundingBound:
         if self._motion is None:
             return math.log10(self.row.amplification or 1.0)
         decades = math.log10(amplification(*self._motion, exact(horizon)))
-        return decades + _FASTER * max(0.0, decades - math.log10(FOLLOWED))
+        return decades + _EXCESS_RATE * max(0.0, decades - math.log10(FOLLOWED))
 
     def _unit(self, quantity: Quantity | None) -> float:
         """log10 of the size of a quantity along the motion."""
@@ -324,15 +323,15 @@ class RoundingBound:
 
 
 _BY_CHANCE = 1.4
-"""One rerun in ten has a band wider by more than that: further, a candidate's own band is not allowed for."""
-_LEAST = 0.05
-"""Decades.  A band below this excuses nothing that the allowed loss does not; its own scatter is of no interest."""
-_LEAST_LOST = 0.3
-"""Decades, where the motion loses all digits before the end: its errors are as large as it is, and a rerun that comes
-near the motion again by chance makes the band."""
+"""One rerun in ten has a band wider by more than this factor, up to which the candidate's band is allowed for."""
+_LEAST_BAND = 0.05
+"""Decades.  A narrower band allows nothing beyond the allowed loss; its own scatter is irrelevant."""
+_LEAST_BAND_LOST = 0.3
+"""Decades, where all significant digits are lost before the end: the errors are as large as the motion, and a rerun
+that returns near the motion by chance determines the band."""
 STEP_CONTROL = 1.2
-"""Decades.  A rounding may turn a step of a method with step control into another one, which moves its truncation error
-by that at most: no band excuses a larger loss that rounding does not explain."""
+"""Decades.  A rounding may change the steps chosen by step control, and so the truncation error by this at most: no
+band excuses a larger loss that rounding does not explain."""
 
 
 def allowed_loss(old: Metric, new: Metric) -> float:
@@ -350,10 +349,10 @@ def allowed_gain(old: Metric, new: Metric) -> float:
 
 
 def of_starts(metric: Metric, row: Row) -> Metric:
-    """The metric with its band; over n starts that of the widest part of its error, for a motion that amplifies one
-    start more than the others carries an error from each part to the others.
+    """The metric with its band; over n starts that of the widest component of its error, for a motion that amplifies
+    one start more than the others carries errors from each component to the others.
 
-    No wider than ½ log10 n, by which one start can raise a RMS.
+    No wider than ½ log10 n, the most by which one start can raise a RMS.
     """
     if row.starts == 1 or metric.band is None:
         return metric
@@ -372,9 +371,9 @@ def apart(size: float, gap: float) -> float:
 
 
 def reaches_further(old: Metric, new: Metric, least: tuple[float, float], loss: float) -> bool:
-    """Whether value and band of the candidate together exceed those of the baseline: only then its noise matters.
+    """Whether value and band of the candidate together exceed those of the baseline: only then its noise counts.
 
-    A gain of the value itself may be offset by noise, up to the allowed loss.
+    Noise may offset a gain of the value itself, up to the allowed loss.
     """
     if new.kind == "value":
         return True
@@ -397,13 +396,13 @@ def noisier(kind: ReportedKind, old: Metric, new: Metric, lost: bool = False) ->
         return False
     factor = kind.noise_factor or 1.0
     if not kind.noise_is_added(old):
-        return new.band > factor * max(old.band, _LEAST_LOST if lost else _LEAST)
-    # in decades such noise is as much wider as the number is smaller
+        return new.band > factor * max(old.band, _LEAST_BAND_LOST if lost else _LEAST_BAND)
+    # added noise is wider in decades where the number is smaller
     return _added(new) > _added(old) + math.log10(factor)
 
 
 def _added(metric: Metric) -> float:
-    """log10 of how far the noise moves a number, in its own unit; -inf where absent."""
+    """log10 of the noise of a number, in its own unit; -inf where absent."""
     if metric.log10 is None:
         return -math.inf
-    return math.log10(10 ** max(metric.band or 0.0, _LEAST / 10) - 1) + metric.log10
+    return math.log10(10 ** max(metric.band or 0.0, _LEAST_BAND / 10) - 1) + metric.log10

@@ -1,4 +1,4 @@
-"""One row of a baseline against the same row of a candidate."""
+"""Comparison of a row of a baseline with the same row of a candidate."""
 
 from __future__ import annotations
 
@@ -73,35 +73,35 @@ from heavytop.report.store.checks import (
     other_request,
 )
 
-# Laws of growth in a comparison: whether one can be, and one against another.
+# Comparison of growth laws.
 
 
 _GROWTH = (*CLASSES, "exponential")
 _WIDER = 5.0
-"""The interval of a rerun may be wider by that factor: of 1,400 pairs of ensembles of 16 starts, none is by 4.2."""
+"""Allowed ratio of the widths of intervals of two runs: in 1,400 pairs of ensembles of 16 starts it is below 4.2."""
 _SPAN = 2.0
-"""The fitted span of a rerun may begin later, or end earlier, by that factor."""
+"""Factor by which the fitted span of a rerun may begin later or end earlier."""
 _DETECTS = math.log10(8)
-"""Decades.  The smallest detectable fault of a rerun is larger by a factor of 6.6 at most, in the same pairs."""
+"""Decades.  In the same pairs the smallest detectable fault grows by a factor of 6.6 at most."""
 _BY_CHANCE = 1.4
 """Factor by which the interval of a rerun may be wider than that of the baseline by chance, as its noise bands may."""
-_APART = 0.1
-"""Exponents of two reruns are apart by that part of the width of the baseline's interval: of the dozens of laws in a
-report some intervals just do not meet.  Figures: docs/compare.md."""
-_BENDS_APART = 0.5
+_EXPONENT_GAP = 0.1
+"""Least gap between the exponents of two runs, in widths of the baseline's interval: of the dozens of laws in a report
+some intervals just do not overlap.  Figures: docs/compare.md."""
+_BEND_GAP = 0.5
 """Least difference of bends, each the difference of two exponents over half of the span."""
 _LOST_AT = 0.3
-"""Decades by which the time of the last digit may come earlier, beyond what the noise of the error itself makes it."""
+"""Decades by which the time of the last digit may come earlier, beyond the effect of noise in the error itself."""
 
 
 def judge_law(old: Law, new: Law, noise: float = 0.0, rerun: bool = False) -> Judged:
-    """A change of class is a change; within a class, exponents or bends whose intervals do not meet.
+    """The verdict on two laws: they differ in class, or within a class by exponents or bends with disjoint intervals.
 
     A law that is resolved in one report only is judged as within a class: of two ensembles of one motion one may bend
-    by a little more than a law may.  What it says less of than the other is judged too.
-    noise: decades by which noise alone may move the error that the law is about.
-    rerun: whether the two are of two runs.  Intervals that just do not meet may then be chance, and so may two classes
-    with exponents half way between them; of one and the same series they are not.
+    slightly more than a law may.  A loss of information is judged too.
+    noise: decades by which noise alone may move the error that the law describes.
+    rerun: whether the laws belong to two runs.  Then barely disjoint intervals may be chance, and so may two classes
+    with exponents half way between them; for one and the same series they are not.
     """
     for law in (old, new):
         if problem := inconsistent(law):
@@ -116,62 +116,62 @@ def judge_law(old: Law, new: Law, noise: float = 0.0, rerun: bool = False) -> Ju
             return Verdict.INCOMPARABLE, "the growth is resolved in one report only"
     if new.starts < old.starts:
         return Verdict.INCOMPARABLE, f"{old.starts} starts against {new.starts}"
-    for judged in (_exponents(old, new, rerun), _bends(old, new, rerun)):
+    for judged in (_judge_exponents(old, new, rerun), _judge_bends(old, new, rerun)):
         if judged[0] is not Verdict.SAME:
             break
     if judged[0] in (Verdict.WORSE, Verdict.INCOMPARABLE):
         return judged
-    return _power_of_law(old, new, noise) or judged
+    return _judge_information(old, new, noise) or judged
 
 
 def _between_classes(old: Law, new: Law) -> bool:
-    """Whether the powers of two laws are so near that each might be of the class of the other."""
+    """Whether the exponents of two laws are so near that each law might belong to the class of the other."""
     if "exponential" in (old.growth, new.growth) or old.exponent is None or new.exponent is None:
         return False
     return abs(new.exponent - old.exponent) <= BENT
 
 
-def _exponents(old: Law, new: Law, rerun: bool) -> Judged:
+def _judge_exponents(old: Law, new: Law, rerun: bool) -> Judged:
     if old.exponent is None or new.exponent is None:
         known = old.exponent is not None or new.exponent is not None
         return (Verdict.INCOMPARABLE, "an exponent in one report only") if known else SAME
     if old.low is not None and new.low is not None:
-        return _apart("exponent", interval_of(old), interval_of(new), new.exponent, rerun, _APART)
+        return _judge_intervals("exponent", interval_of(old), interval_of(new), new.exponent, rerun, _EXPONENT_GAP)
     (low, high), (new_low, new_high) = interval_of(old), interval_of(new)
     if new_low > high or new_high < low:
         return Verdict.INCOMPARABLE, "another exponent, and no interval to tell noise from it"
     return SAME
 
 
-def _bends(old: Law, new: Law, rerun: bool) -> Judged:
-    """Where the class of one alone is known: of two laws of a class neither bends by more than a law may."""
+def _judge_bends(old: Law, new: Law, rerun: bool) -> Judged:
+    """The verdict on bends, where only one class is known: two laws of one class bend no more than a law may."""
     if "unresolved" not in (old.growth, new.growth) or old.growth == new.growth:
         return SAME
     if old.bend is None or new.bend is None:
         return Verdict.INCOMPARABLE, "the growth is resolved in one report only, and how it bends is not known of both"
-    return _apart("bend towards the end", old.bend, new.bend, sum(new.bend) / 2, rerun, _BENDS_APART)
+    return _judge_intervals("bend towards the end", old.bend, new.bend, sum(new.bend) / 2, rerun, _BEND_GAP)
 
 
-def _apart(what: str, old: Interval, new: Interval, middle: float, rerun: bool, gap: float) -> Judged:
-    """Two intervals, that of the candidate about ``middle``, which counts as no wider than that of the baseline.
+def _judge_intervals(quantity: str, old: Interval, new: Interval, middle: float, rerun: bool, gap: float) -> Judged:
+    """The verdict on two intervals; that of the candidate, about ``middle``, counts as no wider than the baseline's.
 
-    One that is wider by more than chance is worse.  Those of a rerun are apart by ``gap`` widths of the baseline's.
+    An interval wider by more than chance is worse.  Those of a rerun must be ``gap`` widths of the baseline's apart.
     """
-    width, own = (interval[1] - interval[0] for interval in (old, new))
-    part = min(1.0, (_BY_CHANCE if rerun else 1.0) * width / own) if own > 0 else 1.0
-    low, high = (middle + (end - middle) * part for end in new)
+    width, new_width = (interval[1] - interval[0] for interval in (old, new))
+    shrinkage = min(1.0, (_BY_CHANCE if rerun else 1.0) * width / new_width) if new_width > 0 else 1.0
+    low, high = (middle + (end - middle) * shrinkage for end in new)
     least = gap * width if rerun else 0.0
     if low - old[1] > least:
-        return Verdict.WORSE, f"a larger {what}"
+        return Verdict.WORSE, f"a larger {quantity}"
     if old[0] - high > least:
-        return Verdict.BETTER, f"a smaller {what}"
-    if own > _WIDER * width:
-        return Verdict.WORSE, f"noise: the interval of the {what} is {own:.2g} wide, not {width:.2g}"
+        return Verdict.BETTER, f"a smaller {quantity}"
+    if new_width > _WIDER * width:
+        return Verdict.WORSE, f"noise: the interval of the {quantity} is {new_width:.2g} wide, not {width:.2g}"
     return SAME
 
 
-def _power_of_law(old: Law, new: Law, noise: float) -> Judged | None:
-    """The verdict where the candidate's law says less: its detection power, its span, the time of the last digit."""
+def _judge_information(old: Law, new: Law, noise: float) -> Judged | None:
+    """The verdict where the candidate's law loses detection power, span, or the time of the last digit; None else."""
     for name in ("first", "last", "detects"):
         if getattr(old, name) is not None and getattr(new, name) is None:
             return Verdict.INCOMPARABLE, f"the law no longer says {name}"
@@ -181,9 +181,9 @@ def _power_of_law(old: Law, new: Law, noise: float) -> Judged | None:
     if log_of(new.detects) > log_of(old.detects) + max(_DETECTS, noise):
         return Verdict.WORSE, f"detects a fault of {new.detects} a step, not of {old.detects}"
     if "unresolved" in (old.growth, new.growth) and None in (old.lost_at, new.lost_at):
-        return None  # it is not extrapolated
+        return None  # an unresolved law is not extrapolated
     if "unresolved" not in (old.growth, new.growth) and old.growth != new.growth:
-        return None  # extrapolated by two powers
+        return None  # extrapolated with different powers
     if new.lost_at is not None:
         power = CLASSES.get(new.growth, math.inf)
         earlier = (math.inf if old.lost_at is None else log_of(old.lost_at)) - log_of(new.lost_at)
@@ -195,29 +195,29 @@ def _power_of_law(old: Law, new: Law, noise: float) -> Judged | None:
     return None
 
 
-# One series of a baseline against the same series of a candidate.
+# Comparison of series.
 
 
-_NO_NUMBER = (NAN, MISSING)
-_WORDS = frozenset((*_NO_NUMBER, UNRESOLVED))
+_NOT_NUMBERS = (NAN, MISSING)
+_WORDS = frozenset((*_NOT_NUMBERS, UNRESOLVED))
 _LOST_SHARE = 10
-"""One in so many samples, and two, may no longer be resolved."""
+"""One in so many samples, and two more, may become unresolved."""
 
 
 def judge_series(old: Series, new: Series, allowed: float, floor: float, exactly: bool) -> Judged:
-    """Require the same samples, as many of them numbers, and no larger: single samples are noise, their median is not.
+    """Require the same times, as many numbers, and no larger ones: single samples are noise, the median ratio is not.
 
-    allowed: decades by which the median of the ratios may grow, or where the series must agree ``exactly`` the part of
-    its largest value by which each may be off.  floor: log10 below which all errors are the same.
+    allowed: decades by which the median ratio may grow; where the series must agree ``exactly`` the allowed difference
+    of each value as a fraction of the largest.  floor: log10 below which all errors are the same.
     """
     if old.times != new.times and list(map(exact, old.times)) != list(map(exact, new.times)):
         return Verdict.INCOMPARABLE, "other times"
     before, after = old.values, new.values
     if not (_WORDS.isdisjoint(before) and _WORDS.isdisjoint(after)):
         pairs = list(zip(before, after, strict=True))
-        if any(b == NAN and a not in _NO_NUMBER for a, b in pairs):
+        if any(b == NAN and a not in _NOT_NUMBERS for a, b in pairs):
             return Verdict.WORSE, "a value is no longer a number"
-        if any(b == MISSING and a not in _NO_NUMBER for a, b in pairs):
+        if any(b == MISSING and a not in _NOT_NUMBERS for a, b in pairs):
             return Verdict.INCOMPARABLE, "a value is no longer measured"
         lost = sum(b == UNRESOLVED != a for a, b in pairs)
         if lost > 2 + len(pairs) / _LOST_SHARE:
@@ -228,29 +228,28 @@ def judge_series(old: Series, new: Series, allowed: float, floor: float, exactly
         return SAME
     if exactly:
         values = list(zip(map(exact, before), map(exact, after), strict=True))
-        most = Fraction(allowed) * max(abs(a) for a, _ in values)
-        off = any(abs(b - a) > most for a, b in values)
-        return (Verdict.WORSE, "a value that must agree does not") if off else SAME
+        tolerance = Fraction(allowed) * max(abs(a) for a, _ in values)
+        differs = any(abs(b - a) > tolerance for a, b in values)
+        return (Verdict.WORSE, "a value that must agree does not") if differs else SAME
     sizes = [log_sizes(tuple(texts)) for texts in (before, after)]
     if max(sizes[1]) <= max(floor, min(sizes[0])):
         return SAME
     if min(map(min, sizes)) < floor:
         sizes = [[max(size, floor) for size in part] for part in sizes]
-    grown = median(map(sub, sizes[1], sizes[0]))
-    return (Verdict.WORSE, f"{grown / BITS:.1f} bits lost at half of the samples") if grown > allowed else SAME
+    growth = median(map(sub, sizes[1], sizes[0]))
+    return (Verdict.WORSE, f"{growth / BITS:.1f} bits lost at half of the samples") if growth > allowed else SAME
 
 
 _STEPS = 2
-"""Factor: one method with one setting takes as many steps, and evaluates the field as often; beyond this it is
-another method."""
-_ANOTHER: Judged = (Verdict.INCOMPARABLE, "it says that it is another quantity")
+"""Factor: beyond this ratio of steps, or of evaluations of the field, the method must be another one."""
+_OTHER_QUANTITY: Judged = (Verdict.INCOMPARABLE, "it says that it is another quantity")
 
 
 class Finding(msgspec.Struct, frozen=True, gc=False):
-    """One metric of one row: verdict, the two values as text, and why.
+    """The verdict on one metric of one row, with the two values as text and the reason.
 
-    name: of the metric, "" for a whole row.  of: "" for a metric, series, growth for the law of one, seconds for a
-    timing.  slight: a loss of truncation that is allowed of other errors.
+    name: of the metric, "" for a whole row.  of: "" for a metric; series; growth for the law of a series; seconds for a
+    timing.  slight: a loss by truncation that would be allowed of other errors.
     """
 
     row: Identity
@@ -264,27 +263,27 @@ class Finding(msgspec.Struct, frozen=True, gc=False):
 
     @property
     def metric(self) -> str:
-        """Its name in policies and other programs: ``drift_energy_max``, ``growth drift_energy``."""
+        """The name of the metric in policies and other programs: ``drift_energy_max``, ``growth drift_energy``."""
         return f"{self.of} {self.name}".lstrip()
 
     @property
     def method(self) -> tuple[str, str]:
-        """Whose it is: the integrator and its format."""
+        """The integrator and its format."""
         return self.row.key.subject.name, self.row.key.precision
 
     def as_same(self) -> Finding:
-        """The finding, as the same."""
+        """The finding with the verdict same."""
         return Finding(self.row, self.name, Verdict.SAME, self.baseline, self.candidate)
 
     @property
     def of_yardstick(self) -> bool:
-        """Whether it is about heyoka, which is measured beside an integrator for scale."""
+        """Whether the row is heyoka's, which is measured beside another integrator for scale."""
         name, _ = self.method
         return name.partition(":")[0] == HEYOKA and not is_third_party(name)
 
     @property
     def timing(self) -> bool:
-        """Whether it is about seconds."""
+        """Whether the metric is a timing."""
         return self.of == "seconds"
 
     def to_json(self) -> dict[str, Any]:
@@ -304,10 +303,10 @@ class Finding(msgspec.Struct, frozen=True, gc=False):
 class RowComparison:
     """Compares rows under one policy.
 
-    timed: whether seconds are compared; repeated: whether those of runs that were repeated for it are.
-    list_same: False to count what plainly stayed the same, in :attr:`same`.
+    timed: whether seconds are compared; repeated: whether those of repeated runs are.
+    list_same: False to count unchanged metrics in :attr:`same` instead of listing them.
     failed: rows of the candidate that failed in both reports, in the same way.
-    checked: of the baseline and of the candidate, whether each row was found consistent as it was read.
+    checked: of the baseline and of the candidate, whether each row was already checked on reading.
     """
 
     policy: Policy
@@ -324,7 +323,7 @@ class RowComparison:
         self._bound: RoundingBound | None = None
 
     def ignores(self, row: Row) -> bool:
-        """Whether a rule leaves out the row as a whole: one whose pattern takes every metric."""
+        """Whether a rule ignores the whole row: one whose pattern matches every metric."""
         return self.limits(row, "").ignore
 
     def limits(self, row: Row, metric: str) -> Limits:
@@ -332,13 +331,13 @@ class RowComparison:
         return self.lookup(row.key.kind, row.case, metric)
 
     def compare(self, key: Identity, old: Row, new: Row) -> list[Finding]:
-        """All findings about a row that both reports have.  key: of the baseline's."""
+        """All findings about a row that both reports have.  key: its identity in the baseline."""
         versions = old.key.subject.version, new.key.subject.version
         key = key._replace(versions=versions) if all(versions) else key
-        if UNSUPPORTED in (old.outcome, new.outcome) and (verdict := _support(old, new)) is not None:
-            return [] if self.ignores(old) else self._whole(key, old, new, *verdict)
+        if UNSUPPORTED in (old.outcome, new.outcome) and (verdict := _judge_support(old, new)) is not None:
+            return [] if self.ignores(old) else self._whole_row(key, old, new, *verdict)
         if (judged := self._outcomes(old, new)) is not None:
-            return [] if self.ignores(old) else [*self._whole(key, old, new, *judged), *self._limits(key, old, new)]
+            return [] if self.ignores(old) else [*self._whole_row(key, old, new, *judged), *self._limits(key, old, new)]
         if reason := self._incomparable(old, new):
             if self.ignores(old):
                 return []
@@ -358,8 +357,8 @@ class RowComparison:
             findings += self._seconds(key, old, new)
         return findings
 
-    def _whole(self, key: Identity, old: Row, new: Row, verdict: Verdict, why: str) -> list[Finding]:
-        """The finding about a row that is judged by its outcome."""
+    def _whole_row(self, key: Identity, old: Row, new: Row, verdict: Verdict, why: str) -> list[Finding]:
+        """The finding about a row judged by its outcome."""
         if verdict is Verdict.SAME and new.outcome != UNSUPPORTED:
             self.failed.append(new)
         if verdict is Verdict.SAME and not self.list_same:
@@ -368,7 +367,7 @@ class RowComparison:
         return [Finding(key, "", verdict, old.outcome, new.outcome, why)]
 
     def _outcomes(self, old: Row, new: Row) -> Judged | None:
-        """The verdict of rows of one motion of which one, or both, did not reach the horizon; None else."""
+        """The verdict on rows of one motion of which at least one did not reach the horizon; None else."""
         if old.outcome == new.outcome == SUCCESS or old.key.horizon != new.key.horizon:
             return None
         if other_request(old, new) or (None not in (old.data, new.data) and other_data(old.data, new.data)):
@@ -418,17 +417,17 @@ class RowComparison:
     def _is_plainly_same(
         self, kind: ReportedKind, metric: Metric, match: Metric, old: Row, new: Row, lost: bool
     ) -> bool:
-        """Whether two errors, as most of most reports, differ by less than they may where no rule is about them.
+        """Whether two errors without a rule differ by less than the smallest allowance, as most errors do.
 
-        Then neither truncation nor the cases of step control matter, which :meth:`_metric` looks at.
+        Then neither truncation nor step control matter, which :meth:`_metric` considers.
         """
         before, after, usual = metric.log10, match.log10, self.lookup.usual
         if before is None or after is None or not metric.kind == match.kind == "error":
             return False
-        band, own, allowed = metric.band, match.band, usual.truncation
-        if metric.quantity != match.quantity or (own is None and band is not None):
+        band, new_band, allowed = metric.band, match.band, usual.truncation
+        if metric.quantity != match.quantity or (new_band is None and band is not None):
             return False
-        if -allowed <= before - after <= allowed and (band == own or (own or math.inf) < (band or 0.0)):
+        if -allowed <= before - after <= allowed and (band == new_band or (new_band or math.inf) < (band or 0.0)):
             return True
         if band is not None and old.starts == new.starts == 1:
             allowed = max(allowed, min(STEP_CONTROL, usual.noise * allowed_loss(metric, match)))
@@ -439,30 +438,30 @@ class RowComparison:
         return abs(max(before, least(old.metrics, metric)) - max(after, least(new.metrics, match))) <= allowed
 
     def _metric(self, metric: Metric, match: Metric, limits: Limits, old: Row, new: Row) -> Judged:
-        """The values first, then the noise of the candidate, which is worse where it is more than chance and reaches
-        further than that of the baseline.
+        """The verdict by the values, then by the noise of the candidate: worse where it exceeds chance and value and
+        noise together exceed those of the baseline.
         """
         if new.outcome != SUCCESS and metric.value == match.value in (NAN, MISSING):
-            return SAME  # both stopped before there was one
+            return SAME  # both stopped before the first value
         least_of = least(old.metrics, metric), least(new.metrics, match)
         kind = kind_of(old, self.kinds)
         bound = self._bound_of(old) if (metric.band or match.band) and kind.noise_is_reruns(metric) else None
-        known, banded = of_starts(metric, old), of_starts(match, new)
+        old_banded, new_banded = of_starts(metric, old), of_starts(match, new)
         truncated = self._is_truncation(metric, match, old, new)
         assumed = 0.0 if truncated else kind.assumed_band(old.key.subject)
         noise = assumed if metric.band is None else kind.least_band(old.starts)
-        if noise > (known.band or 0.0):
-            known = msgspec.structs.replace(known, band=noise)
+        if noise > (old_banded.band or 0.0):
+            old_banded = msgspec.structs.replace(old_banded, band=noise)
         eps = self._eps(metric.quantity, old)
         allowed = msgspec.structs.replace(limits, loss=limits.truncation) if truncated else limits
-        judged = judge(known, banded, allowed, eps, least_of, bound)
+        judged = judge(old_banded, new_banded, allowed, eps, least_of, bound)
         changed = judged[0] in (Verdict.WORSE, Verdict.BETTER) and limits.noise and not beyond_limit(match, limits)
         if changed and self._is_by_rounding(metric, match, old):
             return SAME
         if judged[0] in (Verdict.WORSE, Verdict.INCOMPARABLE):
             return judged
         if judged[0] is Verdict.SAME and metric.quantity != match.quantity:
-            return _ANOTHER
+            return _OTHER_QUANTITY
         if metric.band is not None and match.band is None and match.log10 is not None:
             return Verdict.INCOMPARABLE, f"its noise is not measured, which was {metric.band:.2g} decades"
         wider = noisier(kind, metric, match, bool(old.reference.until))
@@ -481,16 +480,16 @@ class RowComparison:
             if a is None or b is None:
                 judged = (Verdict.MISSING, "the law is missing") if b is None else (Verdict.NEW, "")
             else:
-                # the same series again has the same roundings, so that another law of it is not chance
+                # an equal series has equal roundings, so that a different law of it is not chance
                 rerun = name in old.series and name in new.series and old.series[name] != new.series[name]
                 judged = judge_law(a, b, self._noise(summed.get(name, {}), old, limits), rerun)
                 if judged[0] is Verdict.SAME and a.quantity != b.quantity:
-                    judged = _ANOTHER
+                    judged = _OTHER_QUANTITY
             before, after = (None if law is None else law_text(law) for law in (a, b))
             yield Finding(key, name, judged[0], before, after, judged[1], "growth")
 
     def _series(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
-        """Findings of series that changed: an equal one is not a finding."""
+        """Findings of series that changed; equal ones give none."""
         if old.series is new.series:
             return
         summed = _by_series(old)
@@ -514,50 +513,50 @@ class RowComparison:
                 if largest and all(self._is_by_rounding(*pair, old) for pair in largest):
                     judged = judge_series(series, match, math.inf, floor, exactly)
             if judged[0] is Verdict.SAME and series.quantity != match.quantity:
-                judged = _ANOTHER
+                judged = _OTHER_QUANTITY
             if judged[0] is not Verdict.SAME:
                 counts = [f"{len(samples.values)} samples kept" for samples in (series, match)]
                 yield Finding(key, name, judged[0], counts[0], counts[1], judged[1], "series")
 
     def _row(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
-        """Findings beside the numbers themselves that make these incomparable."""
+        """Findings, apart from metrics, by which the numbers are incomparable."""
         if old.finite and not new.finite:
             yield Finding(key, "", Verdict.WORSE, "finite", "not finite", "a value is no longer finite")
-        taken = [(row.steps, row.order, row.evaluations) for row in (old, new)]
-        if self.policy.flags != "ignore" and taken[0] != taken[1]:
+        work = [(row.steps, row.order, row.evaluations) for row in (old, new)]
+        if self.policy.flags != "ignore" and work[0] != work[1]:
             method = [("other steps", old.steps, new.steps, _STEPS), ("another order", old.order, new.order, 1)]
             if old.evaluations is not None:
                 method.insert(1, ("other evaluations of the field", old.evaluations, new.evaluations, _STEPS))
-            for why, before, after, factor in method:
+            for reason, before, after, factor in method:
                 few, many = sorted(-1 if count is None else count for count in (before, after))
                 if few * factor < many:
-                    yield Finding(key, "", Verdict.INCOMPARABLE, str(before), str(after), why)
+                    yield Finding(key, "", Verdict.INCOMPARABLE, str(before), str(after), reason)
         fewer = _STEPS if kind_of(old, self.kinds).samples_are_steps else 1
         samples = _samples(new)
         if samples < -(-_samples(old) // fewer):
-            why = "fewer samples: the largest of them is smaller"
-            yield Finding(key, "", Verdict.INCOMPARABLE, f"{_samples(old)} samples", f"{samples} samples", why)
+            reason = "fewer samples: the largest of them is smaller"
+            yield Finding(key, "", Verdict.INCOMPARABLE, f"{_samples(old)} samples", f"{samples} samples", reason)
         rounded = old.input_rounding
         if rounded is not None and new.input_rounding != rounded:
             eps = exact(2) ** (1 - old.bits)
             if new.input_rounding is None or exact(new.input_rounding) > max(exact(rounded), eps):
-                why = "the data were rounded by more"
-                yield Finding(key, "", Verdict.INCOMPARABLE, rounded, new.input_rounding, why)
+                reason = "the data were rounded by more"
+                yield Finding(key, "", Verdict.INCOMPARABLE, rounded, new.input_rounding, reason)
 
     def _seconds(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
-        """The seconds of the fastest of several runs, since other work only adds; those of a single run say nothing.
+        """The finding about the fastest of several runs, as other work only adds seconds; a single run says nothing.
 
-        What compiling took, which caches decide, and a reference, counts and what a program says are not judged.
+        Not judged: compilation, which depends on caches, the reference, counts, and seconds that a program reports.
         """
-        both = "least" in old.seconds and "least" in new.seconds
-        if both and not self.limits(old, "seconds run").ignore:
+        comparable = "least" in old.seconds and "least" in new.seconds
+        if comparable and not self.limits(old, "seconds run").ignore:
             spent = [max(row.seconds["least"], row.seconds.get(UNRESOLVED_SECONDS, 0.0)) for row in (old, new)]
             verdict, why = judge_seconds(spent[0], spent[1], self.policy.timings)
             before, after = (f"{seconds:.3g} s" for seconds in spent)
             yield Finding(key, "run", verdict, before, after, why, "seconds")
 
     def _repeated(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
-        """The seconds of runs that were repeated for a comparison; all count as one metric in a rule for ``run``."""
+        """Findings about the seconds of repeated runs; a rule for ``run`` applies to all of them."""
         limits = self.limits(old, "seconds run")
         if not limits.ignore:
             for name, judged in judge_repeated(old.seconds, new.seconds, self.policy.timings.ratio, limits.noise):
@@ -565,7 +564,7 @@ class RowComparison:
                 yield Finding(key, name, judged[0], before, after, judged[1], "seconds")
 
     def _incomparable(self, old: Row, new: Row) -> str:
-        """Why two rows cannot be compared; empty where they can."""
+        """The reason why two rows are incomparable; empty where they are not."""
         if reason := self._inconsistent(old, new):
             return reason
         if old.horizon != new.horizon and exact(old.horizon) != exact(new.horizon):
@@ -593,11 +592,11 @@ class RowComparison:
         return ""
 
     def _eps(self, quantity: Quantity | None, row: Row) -> float:
-        """log10 of the eps of a row, or of what its roundings add up to."""
+        """log10 of the eps of a row, or of the sum of its roundings."""
         return (1 - row.bits) * BITS + kind_of(row, self.kinds).roundings(quantity, row.steps)
 
     def _is_by_rounding(self, metric: Metric, match: Metric, old: Row) -> bool:
-        """Whether roundings alone make errors as large as either, in a row whose noise was not measured."""
+        """Whether rounding alone explains both errors, in a row whose noise was not measured."""
         if old.flags.get(NOISE) != NOT_MEASURED or None in (metric.log10, match.log10) or metric.kind != "error":
             return False
         kind = kind_of(old, self.kinds)
@@ -605,10 +604,10 @@ class RowComparison:
         return kind.noise_is_reruns(metric) and self._bound_of(old).explains(metric.quantity, largest)
 
     def _is_truncation(self, metric: Metric, match: Metric, old: Row, new: Row) -> bool:
-        """Whether two errors differ by truncation: of the same steps, further apart than roundings bring them.
+        """Whether two errors differ by truncation: with the same steps, by more than rounding explains.
 
-        Where no step is asked for, and reruns have not told what roundings do, evaluations tell that the steps are the
-        same ones: those that step control rejects are counted in them.
+        Without a requested step size and without reruns that measure rounding noise, equal evaluations show that the
+        steps are the same: they include the steps that step control rejects.
         """
         kind, subject = kind_of(old, self.kinds), old.key.subject
         reruns = metric.band is not None and kind.noise_is_reruns(metric)
@@ -623,21 +622,21 @@ class RowComparison:
         return not self._bound_of(old).explains(metric.quantity, apart(low, high - low))
 
     def _bound_of(self, row: Row) -> RoundingBound:
-        """The rounding bound of a row, whose rate and amplification its metrics share."""
+        """The rounding bound of a row, cached for all of its metrics."""
         if self._bound is None or self._bound.row is not row:
             self._bound = RoundingBound(row, kind_of(row, self.kinds))
         return self._bound
 
     def _noise(self, metrics: dict[str, list[Metric]], row: Row, limits: Limits) -> float:
-        """Decades by which noise may move what a series or a law is about: as the metrics that sum it up."""
+        """Decades by which noise may move a series or a law: those of the metrics that summarize it."""
         parts = (metrics.get(part, ()) for part in ("final", "rms", "max"))
         bands = [of_starts(metric, row) for metric in chain.from_iterable(parts) if metric.band]
         widest = max((allowed_loss(metric, metric) for metric in bands), default=0.0)
         return limits.noise * max(widest, kind_of(row, self.kinds).assumed_band(row.key.subject))
 
 
-def _support(old: Row, new: Row) -> tuple[Verdict, str] | None:
-    """The verdict where a row was or is not supported; None where the other was not measured either."""
+def _judge_support(old: Row, new: Row) -> tuple[Verdict, str] | None:
+    """The verdict where a row is unsupported in either report; None where the other was not measured."""
     if old.outcome == new.outcome:
         return Verdict.SAME, ""
     if new.outcome == UNSUPPORTED:
@@ -646,12 +645,12 @@ def _support(old: Row, new: Row) -> tuple[Verdict, str] | None:
 
 
 def _samples(row: Row) -> int:
-    """How many samples the largest values of a row are over; at least those of its series, where it does not say."""
+    """The number of samples of a row; where it is not stated that of its longest series."""
     return row.samples or max((len(series.times) for series in row.series.values()), default=0)
 
 
 def _by_series(row: Row) -> dict[str, dict[str, list[Metric]]]:
-    """The metrics of a row by the name of the series that they sum up, and by their statistic."""
+    """The metrics of a row by the series that they summarize, and by statistic."""
     by_name: dict[str, dict[str, list[Metric]]] = {}
     for metric in row.metrics.values():
         if (quantity := metric.quantity) is not None:
@@ -661,5 +660,5 @@ def _by_series(row: Row) -> dict[str, dict[str, list[Metric]]]:
 
 @lru_cache(1 << 12)
 def _series_key(quantity: Quantity) -> str:
-    """The key of the series that a quantity sums up."""
+    """The key of the series that a quantity summarizes."""
     return quantity.over("").text

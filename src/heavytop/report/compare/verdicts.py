@@ -1,4 +1,4 @@
-"""One number against another of the same kind: the verdict and why."""
+"""Verdicts on pairs of numbers of one kind, and their reasons."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ from heavytop.report.compare.noise import (
 )
 
 _ROUNDED = 2e-6
-"""Two logarithms of six decimals cannot tell a smaller difference."""
+"""Differences below this are not resolved by logarithms of six decimals."""
 _UNRESOLVED = math.log10(1 + RESOLVED_RADII)
-"""Decades by which the bound of an unresolved error may move with its reference as it was: it is |midpoint| + radius,
+"""Decades by which the bound of an unresolved error may change while its reference does not: it is |midpoint| + radius,
 from one radius to eleven."""
 
 
@@ -55,9 +55,9 @@ class Verdict(Enum):
 
 
 NAN, MISSING = "nan", "missing"
-"""Words in the place of a number: the value is missing, or was not measured."""
+"""Words in place of a number: not a number, and not measured."""
 Judged = tuple[Verdict, str]
-"""A verdict and why."""
+"""A verdict and its reason."""
 SAME: Judged = (Verdict.SAME, "")
 
 
@@ -69,15 +69,15 @@ def judge(
     least: tuple[float, float],
     bound: RoundingBound | None = None,
 ) -> Judged:
-    """Two values of one metric.
+    """The verdict on two values of one metric.
 
-    eps: log10 of the format's, or of what its roundings add up to.  least: what an error counts as at least, as
-    log10, in each row.  bound: the most that noise makes of it; None where its band says so by itself.
+    eps: log10 of the format's, or of the sum of its roundings.  least: log10 of the smallest size that counts for an
+    error, in each row.  bound: the largest error that rounding explains; None where the noise band alone decides.
     """
     if old.kind != new.kind:
         return Verdict.INCOMPARABLE, f"kind {old.kind} against {new.kind}"
-    if (word := _no_number(old, new, limits)) is not None:
-        return word
+    if (judged := _not_numbers(old, new, limits)) is not None:
+        return judged
     if old.kind == "error":
         return _errors(old, new, limits, limits.floor + eps, least, bound)
     if old.kind == "duration":
@@ -85,10 +85,10 @@ def judge(
     return _values(old, new, limits)
 
 
-def _no_number(old: Metric, new: Metric, limits: Limits) -> Judged | None:
+def _not_numbers(old: Metric, new: Metric, limits: Limits) -> Judged | None:
     """The verdict where a value is not a number in one row or in both; None where both are.
 
-    NaN is worse than any number, and never the same, not even as itself.  What was not measured is incomparable.
+    NaN is worse than any number, and not the same as NaN.  A value that was not measured is incomparable.
     """
     if MISSING not in (old.value, new.value) and old.value != new.value:
         if new.value == NAN:
@@ -114,9 +114,9 @@ def _errors(
     least: tuple[float, float],
     bound: RoundingBound | None,
 ) -> Judged:
-    """Smaller is better; below the floor all errors are the same.  What its reference does not resolve is at most its
-    bound: never better, and incomparable where the bound itself would be worse, or where it has fallen so far that it
-    is another error or another reference.
+    """Smaller is better; below the floor all errors are the same.  An unresolved error is at most its bound: never
+    better, and incomparable where the bound itself would be worse, or is so much smaller that the error or the
+    reference must be another one.
     """
     a, b = max(size(old), floor, least[0]), max(size(new), floor, least[1])
     if limited := beyond_limit(new, limits):
@@ -141,10 +141,10 @@ def _errors(
 
 
 def _unresolved(old: Metric, new: Metric, lost: float, allowed: float) -> Judged:
-    """lost: decades from the error or bound of the baseline to the bound of the candidate, above the floor."""
+    """The verdict on an unresolved error.  lost: decades above the floor, from the baseline to the new bound."""
     if lost > allowed:
         return Verdict.INCOMPARABLE, f"unresolved below {new.bound}"
-    # two bounds are those of a reference, and the floor is about errors
+    # two bounds depend on their references; the floor applies to errors alone
     moved = size(new) - size(old) if old.value == UNRESOLVED else lost
     if abs(moved) > allowed + _UNRESOLVED:
         return Verdict.INCOMPARABLE, f"unresolved below {new.bound}, {abs(moved):.1f} decades away"
@@ -152,7 +152,7 @@ def _unresolved(old: Metric, new: Metric, lost: float, allowed: float) -> Judged
 
 
 def beyond_limit(new: Metric, limits: Limits) -> Judged | None:
-    """The verdict of a number beyond the limit of a policy, whatever the baseline was; None of any other."""
+    """The verdict on a number beyond the limit of a policy, whatever the baseline is; None within it."""
     if limits.limit is None or new.value == "never" or new.kind == "value":
         return None
     if new.kind == "duration":
@@ -189,19 +189,19 @@ def _durations(old: Metric, new: Metric, limits: Limits, bound: RoundingBound | 
 
 
 def _values(old: Metric, new: Metric, limits: Limits) -> Judged:
-    """A value must agree, whichever way it went."""
+    """Values must agree; neither direction is better."""
     if old.value == new.value:
         return SAME
     differs = Verdict.WORSE, "a value that must agree does not"
     if "never" in (old.value, new.value) or UNRESOLVED in (old.value, new.value):
         return differs
     a, b = exact(old.number), exact(new.number)
-    off = max(limits.value, 10 ** min(limits.noise * allowed_loss(old, new), 300.0) - 1)
-    return SAME if abs(a - b) <= Fraction(off) * max(abs(a), abs(b)) else differs
+    tolerance = max(limits.value, 10 ** min(limits.noise * allowed_loss(old, new), 300.0) - 1)
+    return SAME if abs(a - b) <= Fraction(tolerance) * max(abs(a), abs(b)) else differs
 
 
 def judge_seconds(old: float, new: float, timings: Timings) -> Judged:
-    """Seconds of an integrator by the ratio that is allowed, above the floor."""
+    """The verdict on seconds by the allowed ratio, above the floor."""
     if not (math.isfinite(old) and math.isfinite(new)):
         return Verdict.INCOMPARABLE, "no finite time"
     ratio = max(new, timings.floor) / max(old, timings.floor)
@@ -212,22 +212,22 @@ def judge_seconds(old: float, new: float, timings: Timings) -> Judged:
     return SAME
 
 
-# The seconds of repeated runs of one row against those of another, on one machine.
+# Comparison of the seconds of repeated runs on one machine.
 
 
 BAND = "band"
 """Key of the band of seconds: half-width in decades of the interval that holds the middle 95 % of the runs."""
 _WIDEST = 0.25
-"""Decades.  Runs that scatter by a factor of 3 say nothing of a machine's speed."""
+"""Decades.  Runs that scatter by a factor of 3 do not determine the speed of a machine."""
 
 
 def judge_repeated(
     old: Mapping[str, float], new: Mapping[str, float], ratio: float, noise: float
 ) -> Iterator[tuple[str, Judged]]:
-    """The name of a timing and its verdict: of the median, of the fastest run, and of how much the runs scatter.
+    """The name and the verdict of each timing: the median, the fastest run, and the scatter of the runs.
 
-    A median or a least may grow by ``ratio``, or by ``noise`` times what two runs of the baseline are apart; what the
-    candidate's scatter by excuses nothing.
+    Median and minimum may grow by ``ratio``, or by ``noise`` times the scatter between two runs of the baseline; that
+    of the candidate is no excuse.
     """
     if missing := [name for name in ("run", "least", BAND) if name not in new]:
         yield missing[0], (Verdict.INCOMPARABLE, "its runs are no longer repeated for a comparison")
@@ -243,12 +243,12 @@ def judge_repeated(
         return
     allowed = max(math.log10(ratio), noise * math.sqrt(2) * (0.0 if resolved[0] else old[BAND]))
     for name in ("run", "least"):
-        yield name, _apart(max(old.get(name, 0.0), resolved[0]), max(new[name], resolved[1]), allowed)
+        yield name, _seconds_verdict(max(old.get(name, 0.0), resolved[0]), max(new[name], resolved[1]), allowed)
     if new[BAND] > _WIDEST and not resolved[1]:
         yield BAND, (Verdict.INCOMPARABLE, f"its runs scatter by a factor of {10 ** (2 * new[BAND]):.2g}")
 
 
-def _apart(old: float, new: float, allowed: float) -> Judged:
+def _seconds_verdict(old: float, new: float, allowed: float) -> Judged:
     if min(old, new) <= 0:
         return SAME if old == new else (Verdict.INCOMPARABLE, "a run that took no time")
     grown = math.log10(new / old)
@@ -259,14 +259,14 @@ def _apart(old: float, new: float, allowed: float) -> Judged:
     return Verdict.BETTER, f"{10**-grown:.3g} times as fast, where {10**allowed:.2g} is allowed"
 
 
-# What became of a row as a whole: of two rows of which one, or neither, reached its horizon.
+# Outcomes: the comparison of two rows of which at least one did not reach its horizon.
 
 
 SUCCESS = "success"
-_NO_INTEGRATORS = (OUT_OF_REACH, CONTRADICTION, UNSUPPORTED)
-"""Outcomes that say nothing of what is measured: of its reference, or of what it declares that it cannot do."""
+_NO_RUN = (OUT_OF_REACH, CONTRADICTION, UNSUPPORTED)
+"""Outcomes that are not about the integrator's run, but about its reference or its declared capabilities."""
 _TOO_LONG = {OUT_OF_TIME, NOT_ASKED}
-"""Outcomes of an integrator that does not end; how many workers there are decides which of its rows are asked."""
+"""Outcomes of an integrator that does not return; which of its rows are skipped depends on the number of workers."""
 
 
 def ended(row: Row, which: str) -> str:
@@ -276,17 +276,17 @@ def ended(row: Row, which: str) -> str:
 
 
 def judge_outcomes(old: Row, new: Row, duration: float) -> Judged | None:
-    """The verdict of the outcomes; None where both are success, or the same and numbers decide.
+    """The verdict on two outcomes; None where both are success, or equal and the numbers decide.
 
-    A run that no longer reaches its horizon is worse, whatever ended it, and one that now does is better.  Of two that
-    failed neither has a number: the same where they failed in the same way, else incomparable.  Of two that stopped
-    early the one that stops earlier by more than the allowed part ``duration`` is worse.
+    A run that no longer reaches its horizon is worse, whatever the cause, and one that now does is better.  Two runs
+    that failed in the same way are the same, otherwise incomparable: neither has numbers.  Of two runs that stopped
+    early, the one that stops earlier by more than the fraction ``duration`` is worse.
     """
     before, after = old.outcome, new.outcome
     if before == after == SUCCESS:
         return None
     for row, which in ((old, "baseline"), (new, "candidate")):
-        if row.outcome in _NO_INTEGRATORS:
+        if row.outcome in _NO_RUN:
             return Verdict.INCOMPARABLE, ended(row, which)
     if before == SUCCESS:
         return (Verdict.INCOMPARABLE if after == NOT_ASKED else Verdict.WORSE), ended(new, "candidate")
@@ -302,35 +302,35 @@ def judge_outcomes(old: Row, new: Row, duration: float) -> Judged | None:
 
 
 def _reached(old: Row, new: Row, duration: float) -> Judged | None:
-    """The verdict of two runs that stopped early in the same way, by how far they came."""
-    first, second = (abs(exact(row.time_reached)) for row in (old, new))
-    if second < first * (1 - exact(duration)):
+    """The verdict on two runs that stopped early in the same way, by the times reached."""
+    before, after = (abs(exact(row.time_reached)) for row in (old, new))
+    if after < before * (1 - exact(duration)):
         return Verdict.WORSE, f"{ended(new, 'candidate')}, the baseline at {old.time_reached}"
     return None
 
 
-# Whether what a candidate was compared with is weaker than what its baseline was compared with.
+# Whether the reference of a candidate is weaker than that of its baseline.
 
 
 _RADIUS_DECADES = 1.0
-"""A radius may grow by that much: that of a reference for the same bits does not move at all."""
+"""Allowed growth of a radius; that of a reference for the same bits does not change at all."""
 _DIGITS_KEPT = 0.8
-"""Part of the certified digits that must stay; other data of the same format lose a tenth."""
+"""Fraction of the certified digits that must remain; other data of the same format lose a tenth."""
 _TIME_KEPT = 0.5
-"""Part of the certified time, and of the certified starts, that must stay."""
+"""Fraction of the certified time, and of the certified starts, that must remain."""
 _COMPUTED_DECADES = 2.0
 """Agreement of two computed runs varies by a decade from one ensemble to the next."""
 
 
 def weaker(old: Against, new: Against) -> str:
-    """Why a candidate's reference is another or proves less than that of the baseline; empty where it is as good.
+    """The reason why a candidate's reference is another or proves less than the baseline's; empty where it does not.
 
-    Proven is proven, whichever closed form or enclosure it was: a better certificate makes no difference.
+    All proofs count alike, closed form or enclosure: a better certificate makes no difference.
     """
     if old == new:
         return ""
     if old.how != new.how:
-        return f"compared with {_kind(old)} and with {_kind(new)}"
+        return f"compared with {_reference_name(old)} and with {_reference_name(new)}"
     if old.how == "equations" and old.method != new.method:
         return f"compared with {old.method!r} and {new.method!r}"
     proven = [a.how == "proven" and all(c.proven != "computed" for c in a.certificates) for a in (old, new)]
@@ -348,12 +348,12 @@ def _certified_less(old: Sequence[Certified], new: Sequence[Certified]) -> str:
     digits, after = (
         [math.inf if certificate.digits is None else certificate.digits for certificate in part] for part in (old, new)
     )
-    if not _kept(digits, after, lambda before, after: after >= _DIGITS_KEPT * before):
-        known, lacking = (
+    if not _all_enough(digits, after, lambda before, after: after >= _DIGITS_KEPT * before):
+        stated, lacking = (
             " and ".join("all" if math.isinf(digits) else str(digits) for digits in part) or "no"
             for part in (digits, after)
         )
-        return f"the reference is certified to {lacking} digits, not {known}"
+        return f"the reference is certified to {lacking} digits, not {stated}"
     starts = [
         next((certificate.starts for certificate in part if certificate.starts is not None), None)
         for part in (old, new)
@@ -361,12 +361,12 @@ def _certified_less(old: Sequence[Certified], new: Sequence[Certified]) -> str:
     if starts[0] is not None and (starts[1] or 0) < _TIME_KEPT * starts[0]:
         return f"the reference is certified for {starts[1] or 'no'} starts, not {starts[0]}"
     times, earlier = ([log_of(certificate.time) for certificate in part] for part in (old, new))
-    if not _kept(times, earlier, lambda before, after: after >= before + math.log10(_TIME_KEPT)):
+    if not _all_enough(times, earlier, lambda before, after: after >= before + math.log10(_TIME_KEPT)):
         return "the reference is certified at an earlier time"
     return ""
 
 
-def _kind(reference: Against) -> str:
+def _reference_name(reference: Against) -> str:
     return {"none": "first integrals alone", "equations": reference.method}.get(
         reference.how, f"a {reference.how} reference"
     )
@@ -374,7 +374,7 @@ def _kind(reference: Against) -> str:
 
 @lru_cache(1 << 12)
 def log_of(text: str | None) -> float:
-    """log10 |number|, 0 without one, -inf for 0; nan for what is not a number, which is within no bound."""
+    """log10 |number|, 0 for None, -inf for 0; nan for text that is not a number, which is within no bound."""
     try:
         size = 0.0 if text is None else log10(exact(text))
     except InputError:
@@ -382,6 +382,6 @@ def log_of(text: str | None) -> float:
     return -math.inf if size is None else size
 
 
-def _kept(old: Sequence[float], new: Sequence[float], enough: Callable[[float, float], bool]) -> bool:
-    """Whether each number that the baseline says is there, and is enough."""
+def _all_enough(old: Sequence[float], new: Sequence[float], enough: Callable[[float, float], bool]) -> bool:
+    """Whether the candidate has each number of the baseline, and large enough."""
     return len(new) >= len(old) and all(map(enough, old, new))

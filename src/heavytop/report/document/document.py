@@ -1,5 +1,5 @@
-"""The document of a report: blocks with typed cells.  A kind of measurement gives one list of them, and the
-terminal, the page, JSON and Markdown show it.
+"""The document of a report: blocks with typed cells.  A kind of measurement makes one list of them, and the terminal,
+the page, JSON and Markdown render it.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from heavytop.top.equations import HEAVY_TOP
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# What a row is called, for people.
+# Names of rows for readers.
 
 
 def computed_by(row: Row) -> str:
-    """`` NAME`` of the integrator, "" for heyoka and for what is not computed: behind the case in tables."""
+    """`` NAME`` of the integrator, which follows the case in tables; "" for heyoka and rows that are not computed."""
     subject = row.key.subject
     return f" {subject.name}" if subject.what == "computed" and subject.name != HEYOKA else ""
 
 
 def row_name(row: Identity, with_kind: bool = True) -> str:
-    """Its kind, case, system where it is not the heavy top, subject and format."""
+    """The name of a row: kind, case, system unless it is the heavy top, subject and format."""
     key = row.key
     system = "" if key.system == HEAVY_TOP.name else key.system
     parts = (key.kind if with_kind else "", row.case, system, row.integrator, key.precision)
@@ -39,7 +39,7 @@ def row_name(row: Identity, with_kind: bool = True) -> str:
 
 
 def variant(row: Row, sources: Iterable[tuple[str, Report]]) -> str:
-    """The integrator and what is asked of it; "" for heyoka.  Many starts are named where single ones are too."""
+    """The integrator and its options; "" for heyoka.  Ensembles are marked where there are single starts too."""
     subject = row.key.subject
     name = "" if subject.name == HEYOKA else subject.name
     mixed = row.starts > 1 and any(other.starts == 1 for _, report in sources for other in report.rows)
@@ -51,17 +51,17 @@ _INTEGRALS |= {f"spin{axis}": f"Ω{axis}" for axis in (1, 2, 3)}  # about an axi
 
 
 def integral_text(name: str) -> str:
-    """A first integral by its formula, or by its name in words."""
+    """The formula of a first integral, or its name in words."""
     return _INTEGRALS.get(name, name.replace("_", " "))
 
 
 def with_source(name: str, source: str) -> str:
-    """A label with the report that it is of, where there are several."""
+    """A label with its report, where there are several."""
     return f"{name}, {source}" if source else name
 
 
 def short(value: str, digits: int = 3) -> str:
-    """A metric's text with few digits; words stay as they are."""
+    """The text of a metric with few digits; words are unchanged."""
     try:
         number = exact(value)
     except InputError:
@@ -72,31 +72,31 @@ def short(value: str, digits: int = 3) -> str:
         return f"{float(number):.{digits + 2}g}"
     text = f"{Decimal(decimal_text(number, digits)):.{digits - 1}E}"
     mantissa, _, exponent = text.partition("E")
-    if exact(text) == number:  # a time such as 10^6 has no more digits
+    if exact(text) == number:  # such as a time 10^6
         mantissa = mantissa.rstrip("0").removesuffix(".")
     return f"{mantissa}e{int(exponent)}"
 
 
-# A part of the page, and what its pictures share: legends, names that can be shown, logarithms of what is measured.
+# Sections of the page, and what their pictures share: legends, printable names, logarithms of measured numbers.
 #
-# Sources are ("", report), or ("baseline", ...) and ("candidate", ...): what lies in several is drawn on the same axes.
-# Plots are bounded in number; what is left out is said.
+# Sources are ("", report), or ("baseline", ...) and ("candidate", ...), drawn on the same axes.  The number of plots is
+# bounded; a note counts those left out.
 
 
 MOST_PLOTS = 12
 TIME = "|t| (time units of the data)"
 DASHED = (0, (6.0, 3.0))
 _DASHES = ("", "6 3", "2 2", "8 2 2 2")
-"""Dashes of SVG, in line widths; the first is a whole line."""
+"""Dash patterns of SVG, in line widths; the first is a solid line."""
 
 Sources = Sequence[tuple[str, Report]]
 
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """An entry of a legend: the number of its colour, a marker of matplotlib, a dash of SVG.
+    """An entry of a legend: the index of its colour, a marker of matplotlib, a dash pattern of SVG.
 
-    old: of the baseline, drawn hollow and broad, so that it shows beneath a candidate that did not change.
+    old: of the baseline, drawn hollow and broad, so that it is visible beneath an unchanged candidate.
     """
 
     label: str
@@ -109,9 +109,9 @@ class Key:
 
 @dataclass(slots=True)
 class Section:
-    """A part of the page: words, pictures with one legend, the same in numbers, and what is not drawn.
+    """A section of the page: text, pictures with one legend, their numbers, and notes on what is not drawn.
 
-    answers: what the pictures come to, above them.  place: the sections stand in the order of their places.
+    answers: a table of conclusions above the pictures.  place: sort key of the section.
     """
 
     id: str
@@ -127,11 +127,11 @@ class Section:
     place: int = 100
 
     def key(self, key: Key) -> Key:
-        """``key``, which from now on is in the legend."""
+        """Adds ``key`` to the legend and returns it."""
         return self.legend.setdefault(key.label, key)
 
     def drop_empty_columns(self) -> None:
-        """Take columns in which no row has anything out of the numbers."""
+        """Removes the columns that are empty in every row."""
         used = [index for index in range(len(self.columns)) if any(cell_text(row[index]) for row in self.rows)]
         self.columns = [self.columns[index] for index in used]
         self.rows = [[row[index] for index in used] for row in self.rows]
@@ -141,7 +141,7 @@ _ROOM = 40
 
 
 def clip(text: str, most: int = 60) -> str:
-    """A name that can be shown: one line, no control characters, cut where it is long."""
+    """Text as one printable line, truncated where it is long."""
     line = " ".join("".join(c if c.isprintable() else " " for c in text[: 4 * most]).split())
     if len(text) <= most:
         return line
@@ -149,7 +149,7 @@ def clip(text: str, most: int = 60) -> str:
 
 
 def logarithm(value: str | None) -> float | None:
-    """log10 |value| of a report's text; None for 0 and for what is not a number."""
+    """log10 |value| of a text; None for 0 and for text that is not a number."""
     try:
         return log10(exact(value)) if value is not None else None
     except InputError:
@@ -157,27 +157,27 @@ def logarithm(value: str | None) -> float | None:
 
 
 def points(series: Series, shift: float = 0.0, scale: float = 1.0) -> tuple[list[float], list[float]]:
-    """Logarithms of |t|·scale and of the values minus ``shift``, where both have one."""
+    """log10 of |t|·scale, and log10 of the values minus ``shift``, at the points where both exist."""
     points = [(logarithm(t), logarithm(v)) for t, v in zip(series.times, series.values, strict=False)]
     pairs = [(x + math.log10(scale), y - shift) for x, y in points if x is not None and y is not None]
     return [x for x, _ in pairs], [y for _, y in pairs]
 
 
 class Keys:
-    """Entries of curves by their labels, in the order in which they come: a baseline has the look of its candidate."""
+    """Legend entries of curves, numbered by label in order of appearance; baseline and candidate look alike."""
 
     def __init__(self) -> None:
-        self._places: dict[str, int] = {}
+        self._indices: dict[str, int] = {}
 
     def key(self, label: str, source: str = "") -> Key:
-        """The entry of a curve of that label in the report ``source``."""
-        index = self._places.setdefault(label, len(self._places))
+        """The entry of the curve with that label in the report ``source``."""
+        index = self._indices.setdefault(label, len(self._indices))
         return numbered(f"{label}, {source}" if source else label, index, source == "baseline")
 
 
 def numbered(label: str, index: int, old: bool = False) -> Key:
-    """The entry of the curve that is the ``index``-th: no two of the first thirty-six look alike; further ones, from
-    one turn through the colours to the next, differ in their dashes.
+    """The entry of the ``index``-th curve: the first thirty-six all differ; later ones, from one cycle of colours to
+    the next, differ in their dashes.
     """
     turn = index // len(COLOURS)
     marker = MARKERS[(index + turn) % len(MARKERS)]
@@ -185,9 +185,9 @@ def numbered(label: str, index: int, old: bool = False) -> Key:
 
 
 def draw(axes: Axes, key: Key, x: Any, y: Any, size: float = 3.6, every: float | None = 0.07) -> None:
-    """One curve, or points, as its legend has it.
+    """Draws one curve, or points, in the style of its legend entry.
 
-    every: markers evenly along a curve, however dense its samples are, this part of the diagonal apart; None for all.
+    every: distance of markers along a curve as a fraction of the diagonal; None for a marker at every sample.
     """
     colour = COLOURS[key.colour]
     style: dict[str, Any] = {"lw": 4.5, "alpha": 0.5, "mfc": "none", "ms": size + 2} if key.old else {"ms": size}
@@ -198,21 +198,21 @@ def draw(axes: Axes, key: Key, x: Any, y: Any, size: float = 3.6, every: float |
 
 
 def left_out(section: Section, count: int, what: str) -> None:
-    """Say how many are not drawn."""
+    """Adds a note of how many are not drawn."""
     if count > 0:
         section.notes.append(f"{count} more {what}{'s' if count > 1 else ''} not drawn; report.json has them all.")
 
 
 def scientific(logarithm: float) -> str:
-    """A number given by its logarithm, to two digits: 2.3e-13, 50, 1e5."""
+    """10^logarithm to two digits: 2.3e-13, 50, 1e5."""
     exponent = math.floor(logarithm + 1e-9)
     mantissa = 10 ** (logarithm - exponent)
     return f"{10**logarithm:.3g}" if -4 < exponent < 5 else f"{mantissa:.1f}".removesuffix(".0") + f"e{exponent}"
 
 
 class In(Flag):
-    """Where a block is shown: in the short summary at the end of a run, in the full one (JSON and Markdown have the
-    blocks of that), on the page.
+    """Where a block is shown: in the short summary at the end of a run, in the full one (also JSON and Markdown), on
+    the page.
     """
 
     SHORT = auto()
@@ -222,7 +222,7 @@ class In(Flag):
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """A measured number in few digits, with its rounding noise in decades where that is asked for."""
+    """A measured number in few digits, with its rounding noise in decades where requested."""
 
     metric: Metric | None
     digits: int = 3
@@ -251,13 +251,13 @@ Cell = str | Value | Word | Quantity
 
 
 def cell_text(cell: Cell) -> str:
-    """A cell in words."""
+    """The text of a cell."""
     return cell.text if isinstance(cell, Quantity) else str(cell)
 
 
 @dataclass(frozen=True, slots=True)
 class Headline:
-    """The answer of a kind in a sentence, behind a verdict where it has one.  That of the first place opens a page."""
+    """The conclusion of a kind in a sentence, after a verdict if any.  That of the first place opens a page."""
 
     text: str
     word: Word | None = None
@@ -266,7 +266,7 @@ class Headline:
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """A sentence, behind a verdict where it has one.  style: of a line of a card, "", "soft" or "big"."""
+    """A sentence, after a verdict where it has one.  style: of a line of a card, "", "soft" or "big"."""
 
     text: str
     word: Word | None = None
@@ -278,8 +278,8 @@ class Note:
 class Table:
     """Cells under their columns; the first of each row names it.
 
-    notes: sentences above it.  words: how many first columns are words, the others are numbers.  left: the last one is
-    words too.
+    notes: sentences above it.  words: the number of leading columns of text; the others are numbers.  left: the last
+    one is text too.
     """
 
     title: str
@@ -293,7 +293,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Card:
-    """Lines that belong together, a small table, a note below."""
+    """A group of lines, a small table, a note below."""
 
     title: str
     lines: Sequence[Note]
@@ -303,7 +303,7 @@ class Card:
 
 
 Make = Callable[[Sources, Iterable[str]], Section | None]
-"""A section from the rows of all kinds that ask for it, and the cases to draw first; None for no picture."""
+"""Makes a section from the rows of all kinds that show it, and the cases to draw first; None for no picture."""
 
 
 @dataclass(frozen=True, slots=True)

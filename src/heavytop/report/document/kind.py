@@ -1,4 +1,4 @@
-"""A kind of measurement as reports need it.  The kinds are in :mod:`heavytop.features.kinds`."""
+"""The protocol of a kind of measurement for reports.  The kinds are in :mod:`heavytop.features.kinds`."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from heavytop.report.document.motions import LossLimits, WorseMotions
 
 
 class ReportedKind(Protocol):
-    """One kind of measurement, as far as it is compared, summed up and drawn; what it does not say is the usual.
+    """One kind of measurement, for comparing, summarizing and drawing it; attributes and methods are defaults.
 
-    needed: the metrics that its summary cannot do without.
-    noise_factor: by how much the noise band of a rerun may be wider by chance; None where its rows carry none.
+    needed: the metrics that its summary requires.
+    noise_factor: factor by which the noise band of a rerun may be wider by chance; None where rows carry no bands.
     largest_amplification: of rounding, within the times at which its errors count.
-    samples_are_steps: so these may be fewer as the steps may.
-    may_end_early: what its runs are called, where the rows are there to show that one does not reach its horizon.
-    may_overflow: the same of values that are not finite.
-    place: the headlines stand in the order of their places.
+    samples_are_steps: whether the samples may decrease as the steps may.
+    may_end_early: the name of its runs, where not reaching the horizon is a result and no failure.
+    may_overflow: whether non-finite values are a result and no failure.
+    place: sort key of its headlines.
     """
 
     name: str
@@ -34,31 +34,31 @@ class ReportedKind(Protocol):
     place: int = 0
 
     def carries_band(self, metric: Metric) -> bool:
-        """Whether its rows have a noise band at such a metric."""
+        """Whether its rows have a noise band for such a metric."""
         return self.noise_factor is not None and metric.kind == "error"
 
     def noise_is_added(self, metric: Metric) -> bool:
-        """Whether noise is added to the number, and does not multiply it."""
+        """Whether noise is additive, not multiplicative."""
         return metric.kind != "error"
 
     def noise_is_reruns(self, metric: Metric) -> bool:
-        """Whether the noise band of such a metric comes from runs of one motion with other roundings."""
+        """Whether the noise band of such a metric is measured by reruns with perturbed roundings."""
         return False
 
     def assumed_band(self, subject: Subject) -> float:
-        """Half-width in decades of the rounding noise of a row that has no bands."""
+        """Assumed half-width, in decades, of the rounding noise of a row without bands."""
         return 0.0
 
     def least_band(self, starts: int) -> float:
-        """Half-width in decades of the noise of a row of so many starts, where its band is narrower by chance."""
+        """Least half-width, in decades, of the noise of a row of ``starts`` starts: narrower bands are chance."""
         return 0.0
 
     def roundings(self, quantity: Quantity | None, steps: int) -> float:
-        """log10 of how many eps the roundings of ``steps`` steps add up to, where the row has no bands."""
+        """log10 of the sum, in eps, of the roundings of ``steps`` steps, where the row has no bands."""
         return 0.0
 
     def series_has_more(self, quantity: Quantity | None) -> bool:
-        """Whether a series goes on where the metrics of its quantity have stopped."""
+        """Whether a series continues beyond the samples of the metrics of its quantity."""
         return False
 
     def contradictions(self, row: Row) -> Iterator[str]:
@@ -66,25 +66,25 @@ class ReportedKind(Protocol):
         return iter(())
 
     def line(self, row: Row) -> str:
-        """Beginning of a line about a row of this kind; "" for its first error."""
+        """The beginning of a line about a row of this kind; "" for the first error of the row."""
         return ""
 
     def join(
         self, old: Row, new: Row, folders: tuple[Path, Path], limits: Callable[[str], LossLimits]
     ) -> WorseMotions | None:
-        """The motions of a row of both reports that got worse, by records in their folders; None where it keeps none.
+        """The motions of a row that got worse, by the records in the folders of both reports; None without records.
 
-        limits: what is allowed of a metric.
+        limits: the allowance of a metric.
         """
         return None
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
-        """The blocks of its measured rows, one at least.  beside: what `score` wrote beside its row."""
+        """The blocks of its measured rows, at least one.  beside: the further results of `score`."""
         return ()
 
 
 class Unknown(ReportedKind):
-    """A kind that this program does not have: its rows are compared and listed."""
+    """A kind unknown to this program: its rows are compared and listed."""
 
     name = ""
 
@@ -99,7 +99,7 @@ def kind_of(row: Row, kinds: Kinds) -> ReportedKind:
 
 
 def document(report: Report, kinds: Kinds, shown: In) -> dict[str, list[Block]]:
-    """The blocks of each kind that has measured rows, shown there; the kinds that are not known say nothing."""
+    """The blocks, shown there, of each known kind that has measured rows."""
     measured: dict[str, list[Row]] = {}
     for row in report.rows:
         if row.outcome not in UNMEASURED:

@@ -1,4 +1,4 @@
-"""Motions that got worse, by the records beside two reports, of one row that both have."""
+"""Motions that got worse, found in the records beside two reports."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class LossLimits(Protocol):
 
 
 class WorseMotion(msgspec.Struct, frozen=True):
-    """A motion by its index in the sweep: digits right before and after, None where the run failed, how it ended now,
+    """A motion by its index in the sweep: digits right before and after, None where the run failed, its new outcome,
     and the command that measures it alone.
     """
 
@@ -41,9 +41,9 @@ class WorseMotion(msgspec.Struct, frozen=True):
 
 
 class WorseMotions(msgspec.Struct, frozen=True):
-    """Motions of one survey: how many both reports have, how many got worse, and those that lost most.
+    """Motions of one survey: the number in both reports, the number that got worse, and those with the largest losses.
 
-    reason: why the two are not joined by motion; empty where they are.
+    reason: why the reports are not joined by motion; empty where they are.
     """
 
     row: Identity

@@ -1,6 +1,6 @@
-"""Pictures for a page: axes by matplotlib, given as inline SVG that takes its colours and its font from the page.
+"""Pictures for a page: axes by matplotlib as inline SVG with the colours and the font of the page.
 
-Both axes of a logarithmic plot carry decimal logarithms, because errors such as 1e-997 are no floats.
+Both axes of a logarithmic plot carry decimal logarithms, because errors such as 1e-997 are below the range of double.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#aa4499", "#8c6d1f", "#555555")
-"""Stand-ins that become the page's --c0, --c1, ..., which differ in light and dark."""
+"""Placeholders, replaced by --c0, --c1, ... of the page, which differ in light and dark mode."""
 MARKERS = ("o", "s", "^", "D", "v", "P")
 LABEL = "axis-label"
 _GRID = "#cccccc"
 _LABEL_SIZE = 8.5
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _LEFT, _BOTTOM, _TOP = 0.7, 0.5, 0.12
-"""Inches beside the axes."""
-_ACROSS = 3.28
-"""Inches of the axes themselves, where names beside them do not make them narrower."""
+"""Margins of the axes in inches."""
+_WIDTH = 3.28
+"""Width of the axes in inches, unless names beside them require a narrower one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """One plot; title and description are for those who do not see it too.
+    """One plot; title and description are its alternative text.
 
-    name: an identifier that no other picture of the page has.  note: what the plot shows, in words under it.
-    svg: markup of the picture alone, without its title.  wide: it has names beside its curves.
+    name: an identifier unique on the page.  note: a description below the plot.
+    svg: markup of the picture without its title.  wide: whether names stand beside its curves.
     """
 
     title: str
@@ -53,7 +53,7 @@ class Picture:
 
 @contextmanager
 def quiet_style() -> Iterator[None]:
-    """The look of the page's pictures, without a reading of $ and \\ in names."""
+    """The style of the page's pictures; $ and \\ in names are not parsed as mathematics."""
     require_extra("plots")
     import matplotlib
 
@@ -80,7 +80,7 @@ def quiet_style() -> Iterator[None]:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """A figure of so many inches, without pyplot."""
+    """A figure of ``width`` by ``height`` inches, without pyplot."""
     require_extra("plots")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -91,21 +91,21 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def new_axes(x: str, y: str, height: float = 2.8, right: float = 0.22) -> Any:
-    """Axes of their own figure, ``height`` inches high, with labels; ``right``: inches for names of curves."""
+    """Axes with labels in a new figure, ``height`` inches high.  right: inches for names of curves."""
     from matplotlib.figure import Figure
 
-    across = max(_ACROSS - right + 0.12, 2.2)
-    width = _LEFT + across + right
+    axes_width = max(_WIDTH - right + 0.12, 2.2)
+    width = _LEFT + axes_width + right
     figure = Figure(figsize=(width, height))
-    axes = figure.add_axes((_LEFT / width, _BOTTOM / height, across / width, 1 - (_BOTTOM + _TOP) / height))
+    axes = figure.add_axes((_LEFT / width, _BOTTOM / height, axes_width / width, 1 - (_BOTTOM + _TOP) / height))
     axes.set_xlabel(x, gid=LABEL)
     axes.set_ylabel(y, gid=LABEL)
-    axes.yaxis.set_label_coords((0.2 - _LEFT) / across, 0.5)
+    axes.yaxis.set_label_coords((0.2 - _LEFT) / axes_width, 0.5)
     return axes
 
 
 def decades(axis: Axis, ticks: int = 7) -> None:
-    """Ticks 10⁻⁵, 1, 10, ... on an axis that carries decimal logarithms, which :func:`finish` makes two of at least."""
+    """Ticks 10⁻⁵, 1, 10, ... on an axis of decimal logarithms; :func:`finish` makes it at least two decades long."""
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
     axis.set_major_locator(MaxNLocator(ticks, integer=True, steps=[1, 2, 5, 10]))
@@ -113,7 +113,7 @@ def decades(axis: Axis, ticks: int = 7) -> None:
 
 
 def _two_decades(axes: Axes) -> None:
-    """Widen what :func:`decades` has set to at least two."""
+    """Widens the axes with ticks by :func:`decades` to at least two decades."""
     from matplotlib.ticker import FuncFormatter
 
     for name in ("x", "y"):
@@ -124,12 +124,12 @@ def _two_decades(axes: Axes) -> None:
 
 
 def power_of_ten(exponent: int) -> str:
-    """10⁻⁵; 1, 10 and 100 as they are."""
+    """10⁻⁵; 1, 10 and 100 without an exponent."""
     return str(10**exponent) if 0 <= exponent <= 2 else "10" + str(exponent).translate(_SUPERSCRIPT)
 
 
 class End(NamedTuple):
-    """Where a curve ends on the axes, and what stands there: its name or its law."""
+    """The end of a curve on the axes, and its label: its name or its law."""
 
     text: str
     colour: str
@@ -138,12 +138,12 @@ class End(NamedTuple):
 
 
 def room(labels: Iterable[str]) -> float:
-    """Inches that names beside the axes take, for :func:`new_axes`."""
+    """Inches needed for names beside the axes, for :func:`new_axes`."""
     return 0.25 + max(map(len, labels), default=0) * _LABEL_SIZE * 0.64 / 72
 
 
 def _label_ends(axes: Any, ends: Sequence[End]) -> None:
-    """Write at the right edge what each curve is, moved apart where two would touch, with a thin line to its end."""
+    """Labels each curve at the right edge, with a thin line to its end; labels are moved so that none overlap."""
     low, high = sorted(axes.get_ylim())
     points = axes.get_position().height * axes.figure.get_figheight() * 72
     gap = 1.35 * _LABEL_SIZE * (high - low) / points
@@ -164,9 +164,9 @@ def _label_ends(axes: Any, ends: Sequence[End]) -> None:
 
 
 def apart(heights: Sequence[float], gap: float, low: float, high: float) -> list[float]:
-    """``heights``, ascending, moved as little as makes them ``gap`` apart, those that would touch as one block.
+    """``heights``, ascending, moved by the least amounts that make them ``gap`` apart; touching ones move as a block.
 
-    They are between ``low`` and ``high``, as far as there is room for all.
+    They lie between ``low`` and ``high``, as far as there is room.
     """
     blocks: list[list[float]] = []
     for index, height in enumerate(heights):
@@ -180,7 +180,7 @@ def apart(heights: Sequence[float], gap: float, low: float, high: float) -> list
 
 
 def document(figure: Any, salt: str = "heavytop", **options: Any) -> str:
-    """The figure as an SVG document: no date, no random ids, so that the same figure gives the same bytes."""
+    """The figure as an SVG document, without date and random ids, so that equal figures give equal bytes."""
     import matplotlib
 
     file = StringIO()
@@ -190,7 +190,7 @@ def document(figure: Any, salt: str = "heavytop", **options: Any) -> str:
 
 
 def finish(axes: Any, title: str, description: str, name: str, note: str = "", ends: Sequence[End] = ()) -> Picture:
-    """The axes as a picture.  ``name``: an identifier that no other picture of the page has; ends: of its curves."""
+    """The axes as a picture.  name: an identifier unique on the page.  ends: of its curves."""
     _two_decades(axes)
     _label_ends(axes, ends)
     wide = bool(axes.figure.get_figwidth() > _WIDE)
@@ -198,11 +198,11 @@ def finish(axes: Any, title: str, description: str, name: str, note: str = "", e
 
 
 _WIDE = 4.5
-"""Inches from which a picture is one of the wide ones."""
+"""Inches beyond which a picture is wide."""
 
 
 def _inline(figure: Any, name: str) -> str:
-    """The content of the <svg> of a page: ids of its own and only where needed, short numbers, the page's colours.
+    """The content of the <svg> of a page: unique ids and only where needed, short numbers, the page's colours.
 
     The ids of clip paths and markers are hashes with ``name``; the others are numbered alike in every figure.
     """
@@ -225,6 +225,6 @@ def _shorter(match: re.Match[str]) -> str:
 
 
 def spoken(parts: Sequence[str], most: int = 12) -> str:
-    """Sentences of a description, not more than a listener can bear."""
-    rest = len(parts) - most
-    return " ".join([*parts[:most], *([f"And {rest} more."] if rest > 0 else [])])
+    """The first sentences of a description, and the number of the others."""
+    remaining = len(parts) - most
+    return " ".join([*parts[:most], *([f"And {remaining} more."] if remaining > 0 else [])])

@@ -1,4 +1,4 @@
-"""Whether the rows of a report can be: what no run writes is refused, with the row and its field."""
+"""Validation of the rows of a report: those that no run writes are refused, with the row and its field."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from heavytop.records import UNMEASURED, Data, Law, Metric, Quantity, Row, Serie
 from heavytop.report.document.document import row_name
 from heavytop.report.document.kind import Kinds, ReportedKind, kind_of
 
-# Whether the rows of two reports are of one motion: the exact data of the top and its start.
+# Whether the rows of two reports belong to one motion: the exact data of the top and its start.
 
 
 _VECTORS = ("inertia", "centre", "omega", "gamma", "rotor")
 
 
 def other_data(old: Data | None, new: Data | None) -> str:
-    """Why the data of a candidate are not those of its baseline; empty where they are, however they are written.
+    """The first difference between the data of a candidate and of its baseline; empty where they are equal as numbers.
 
-    An ensemble of a baseline that does not name the start by which the random ones are drawn is compared by its top.
+    An ensemble is compared by its top alone where the baseline lacks the start from which the random ones are drawn.
     """
     if old == new:
         return ""
@@ -45,23 +45,24 @@ def other_data(old: Data | None, new: Data | None) -> str:
 
 
 def other_request(old: Row, new: Row) -> str:
-    """Why a candidate answers another request than its baseline; "" where it is the same.
+    """The first difference between the requests of a candidate and of its baseline; empty without one.
 
-    A baseline of before that rows said so is compared, but for a survey, whose data are its request.
+    A baseline of a former version, whose rows have no request, is compared, except for a survey, whose data are its
+    request.
     """
     if not old.request:
         return "the baseline does not say which tops it surveys" if old.spread else ""
     before, after = old.request, new.request or {}
     for name in sorted(before.keys() | after.keys()):
-        one, other = (part.get(name) or "none" for part in (before, after))
-        if one != other:
-            return f"another request: {name} {one[:60]} against {other[:60]}"
+        expected, requested = (part.get(name) or "none" for part in (before, after))
+        if expected != requested:
+            return f"another request: {name} {expected[:60]} against {requested[:60]}"
     return ""
 
 
 @lru_cache(1 << 14)
 def impossible(data: Data, starts: int) -> str:
-    """Data of a row of so many starts that no run writes, in words; empty without any."""
+    """The fault of data that no run with ``starts`` starts writes; empty without one."""
     for name in _VECTORS:
         count = len(getattr(data, name))
         if count != 3 and (count or name in _VECTORS[:2] or (starts == 1 and name != "rotor")):
@@ -84,19 +85,19 @@ def _text(texts: str | tuple[str, ...]) -> str:
     return (texts if isinstance(texts, str) else ", ".join(texts) or "none")[:120]
 
 
-# Whether the numbers of one row agree with one another.
+# Consistency of the numbers of one row.
 #
-# Each rule holds for every row that a run writes.  A row that breaks one was edited, or written by a broken program.
+# Each rule holds for every row that a run writes.  A row that breaks one was edited, or written by a faulty program.
 
 
 CLOSE = 1e-5
-"""Decades: how far two logarithms of the same number may be apart, for numbers have six digits at least."""
+"""Decades by which two logarithms of one number may differ: numbers have at least six digits."""
 _SUCCESS = Outcome.SUCCESS.value
 _NOT_FINITE = frozenset(("nan", "missing"))
 _NOT_NUMBERS = _NOT_FINITE | {UNRESOLVED, "never"}
 
-_HALF_WAY = 0.25 - NEAR
-"""Half of an interval that holds one class and no other, wherever it is: what is known of an exponent without one."""
+_ASSUMED_HALF_WIDTH = 0.25 - NEAR
+"""Half-width of an interval that contains one class and no other: assumed for an exponent without an interval."""
 
 
 def contradictions(row: Row, kind: ReportedKind) -> Iterator[str]:
@@ -133,14 +134,14 @@ def _reached(row: Row) -> Iterator[str]:
 
 @lru_cache
 def _bits(precision: str) -> int | None:
-    """The bits of a format; None of the precision of a row that has none, or several."""
+    """The bits of a format; None for a row without one, or with several."""
     with suppress(InputError):
         return parse(precision).bits
     return None
 
 
 def _sizes(metrics: Mapping[str, Metric]) -> Iterator[str]:
-    """A root mean square and a last value are no larger than the largest."""
+    """Contradictions of sizes: root mean square and last value are at most the largest value."""
     for metric in metrics.values():
         quantity = metric.quantity
         if quantity is not None and metric.log10 is not None and quantity.statistic == "max":
@@ -167,10 +168,10 @@ def _series(row: Row, kind: ReportedKind) -> Iterator[str]:
         if row.finite and not _NOT_FINITE.isdisjoint(series.values):
             yield f"finite: said to be finite, but {name} holds nan or missing"
         if series.quantity is not None and not kind.series_has_more(series.quantity):
-            yield from _against_metrics(series.quantity, series, row)
+            yield from _metric_contradictions(series.quantity, series, row)
 
 
-def _against_metrics(quantity: Quantity, series: Series, row: Row) -> Iterator[str]:
+def _metric_contradictions(quantity: Quantity, series: Series, row: Row) -> Iterator[str]:
     of_largest, _, of_last = _keys(quantity)
     largest, last = row.metrics.get(of_largest), row.metrics.get(of_last)
     if largest is not None and (size := peak(series)) is not None and size > bound(largest) + CLOSE:
@@ -185,12 +186,12 @@ def peak(series: Series) -> float | None:
 
 
 def numbers_of(series: Series) -> tuple[str, ...]:
-    """The values of a series that are no words."""
+    """The values of a series that are numbers."""
     return tuple(series.values if _NOT_NUMBERS.isdisjoint(series.values) else filter(is_number, series.values))
 
 
 def ended(series: Series, row: Row) -> bool:
-    """Whether the last value of a series is that at the time which the row reached."""
+    """Whether a series ends at the time that the row reached."""
     times = series.times[-1:]
     return times == [row.time_reached] or (bool(times) and exact(times[0]) == exact(row.time_reached))
 
@@ -212,7 +213,7 @@ def size_of(value: str) -> float | None:
 
 
 def is_number(value: str) -> bool:
-    """Whether a value of a series is no word."""
+    """Whether a value of a series is a number, not a word."""
     return value not in _NOT_NUMBERS
 
 
@@ -220,9 +221,9 @@ def is_number(value: str) -> bool:
 def log_sizes(texts: tuple[str, ...]) -> list[float]:
     """log10 |number| of each, -1e9 for 0; raises InputError for text that is not a number.
 
-    The rules that check and compare a row ask it of the same series.
+    Cached: several rules that check and compare a row need it of the same series.
     """
-    if not _are_plain(texts):
+    if not _plain_numbers(texts):
         return [_floor(log10(exact(text))) for text in texts]
     with suppress(ValueError):
         sizes = list(map(abs, map(float, texts)))
@@ -232,7 +233,7 @@ def log_sizes(texts: tuple[str, ...]) -> list[float]:
 
 
 def log_size(text: str) -> float:
-    """log10 |number|, -1e9 for 0; told without the cost of an exact one where a float holds it."""
+    """log10 |number|, -1e9 for 0; in floating point where the number is in the range of double."""
     try:
         size = abs(float(text))
     except ValueError:
@@ -241,7 +242,7 @@ def log_size(text: str) -> float:
 
 
 def bound(metric: Metric) -> float:
-    """log10 of the most that a metric can be; infinite where it is not finite or missing."""
+    """log10 of the largest possible size of a metric; 1e9 where it is not finite or missing."""
     if metric.log10 is not None:
         return metric.log10
     if metric.value == UNRESOLVED and metric.bound:
@@ -259,7 +260,7 @@ def law_text(law: Law) -> str:
 
 @lru_cache(1 << 12)
 def inconsistent(law: Law) -> str:
-    """Why a law contradicts itself: class, exponent, intervals and span; empty where it does not."""
+    """The contradiction within a law, of its class, exponent, intervals and span; empty without one."""
     if (law.low is None) != (law.high is None) or (law.exponent is None and law.low is not None):
         return "half an interval, or one without its exponent"
     if law.first is not None and law.last is not None and exact(law.first) > exact(law.last):
@@ -272,17 +273,17 @@ def inconsistent(law: Law) -> str:
         return "an exponent or an interval that is not finite"
     if not low <= law.exponent <= high or bend[0] > bend[1]:
         return f"an interval from {low:g} to {high:g} without its exponent {law.exponent:g}, or a bend that ends first"
-    law_said = f"{law.growth} with the exponent {law.exponent:g} in [{low:g}, {high:g}]"
+    fault = f"{law.growth} with the exponent {law.exponent:g} in [{low:g}, {high:g}]"
     if law.growth == "exponential":
-        return "" if law.exponent > 0 and law.bend is None else law_said
+        return "" if law.exponent > 0 and law.bend is None else fault
     if law.low is None:
-        low, high = low - _HALF_WAY, high + _HALF_WAY
+        low, high = low - _ASSUMED_HALF_WIDTH, high + _ASSUMED_HALF_WIDTH
     expected = "unresolved" if bent(bend) else nearest_class(law.exponent, low, high)
-    return "" if law.growth == expected else law_said
+    return "" if law.growth == expected else fault
 
 
 def interval_of(law: Law) -> Interval:
-    """That of the exponent; where it has none, the exponent alone."""
+    """The interval of the exponent; without one the exponent alone."""
     assert law.exponent is not None
     return (law.exponent, law.exponent) if law.low is None or law.high is None else (law.low, law.high)
 
@@ -291,7 +292,7 @@ REMEDY = "Make it again with `heavytop run`, or of a trajectory with `heavytop s
 
 
 def check_keys(file: Path | str, rows: Iterable[Row]) -> None:
-    """Raises InputError where a row is there twice."""
+    """Raises InputError for a repeated row."""
     identities = set()
     for row in rows:
         if row.identity in identities:
@@ -300,14 +301,14 @@ def check_keys(file: Path | str, rows: Iterable[Row]) -> None:
 
 
 def check_rows(file: Path, rows: Sequence[Row], kinds: Kinds) -> None:
-    """Raises InputError where a row cannot be, or contradicts itself, naming it and its field."""
-    doubtful = _doubtful([metric for row in rows for metric in row.metrics.values()])
+    """Raises InputError for an impossible or contradictory row, with its name and field."""
+    doubtful = _doubtful_metrics([metric for row in rows for metric in row.metrics.values()])
     for row in rows:
         _refuse_first(file, row, _problems(row, kind_of(row, kinds), doubtful))
 
 
 def check_seconds(file: Path, rows: Iterable[Row], kinds: Kinds) -> None:
-    """Raises InputError where seconds contradict a row of which all else is checked: only kinds look at them."""
+    """Raises InputError where seconds contradict a row that is otherwise checked: only kinds have rules for them."""
     for row in rows:
         _refuse_first(file, row, kind_of(row, kinds).contradictions(row) if row.outcome == _SUCCESS else ())
 
@@ -321,7 +322,7 @@ def _refuse_first(file: Path, row: Row, problems: Iterable[str]) -> None:
 def _problems(row: Row, kind: ReportedKind, doubtful: set[int]) -> Iterator[str]:
     """Faults of a row, as ``FIELD: REASON``; only the first counts, as later ones may follow from it.
 
-    doubtful: ids of the metrics that are looked at one by one.
+    doubtful: ids of the metrics to be checked one by one.
     """
     yield from _of_fields(row, kind)
     for name, law in row.laws.items():
@@ -345,7 +346,7 @@ def _of_fields(row: Row, kind: ReportedKind) -> Iterator[str]:
         yield "bits: a format without any"
     if row.time_reached != row.horizon:
         reached, horizon = exact(row.time_reached), exact(row.horizon)
-        # a time is rounded to the format, the horizon need not be
+        # the time is rounded to the format, the horizon is not always
         if reached * horizon < 0 or abs(reached) > abs(horizon) * (1 + Fraction(2, 2**row.bits)):
             yield f"time_reached: {row.time_reached} is beyond {row.horizon}"
     lacking = [name for name in kind.needed if name not in row.metrics]
@@ -366,7 +367,7 @@ WORDS = {
     "duration": ("nan", "missing", "never"),
     "value": ("nan", "missing", "never", UNRESOLVED),
 }
-"""Words in the place of a number, for each kind of metric."""
+"""Words in place of a number, for each kind of metric."""
 
 
 def _of_metric(metric: Metric, finite: bool) -> Iterator[str]:
@@ -400,7 +401,7 @@ def _of_series(series: Series) -> Iterator[str]:
 
 
 def _cause(text: str) -> str:
-    """Why a text is not a number; empty where it is."""
+    """The reason why a text is not a number; empty where it is one."""
     try:
         exact(text)
     except InputError as error:
@@ -412,8 +413,8 @@ def _negative(text: str) -> str:
     return f"{text} is negative" if exact(text) < 0 else ""
 
 
-def _doubtful(metrics: Sequence[Metric]) -> set[int]:
-    """The ids of the metrics that are not plainly a number with its logarithm; told in a few strokes."""
+def _doubtful_metrics(metrics: Sequence[Metric]) -> set[int]:
+    """The ids of the metrics that are not a number with its logarithm, found by one vectorized test."""
     values = numpy.array(_floats([metric.value for metric in metrics]))
     logarithms = numpy.array([metric.log10 if metric.bound is None else None for metric in metrics], dtype=float)
     with numpy.errstate(all="ignore"):
@@ -423,14 +424,14 @@ def _doubtful(metrics: Sequence[Metric]) -> set[int]:
 
 
 def _floats(texts: Sequence[str]) -> list[float]:
-    """Numbers, without the cost of exact ones; nan alone for text that is not a number outside Python."""
+    """The texts as floats; nan alone where a text is not a number, or one in Python only."""
     try:
-        return list(map(float, texts)) if _are_plain(texts) else [math.nan]
+        return list(map(float, texts)) if _plain_numbers(texts) else [math.nan]
     except ValueError:
         return [math.nan]
 
 
-def _are_plain(texts: Iterable[str]) -> bool:
-    """Whether Python reads no more numbers in the texts than :func:`exact` does."""
+def _plain_numbers(texts: Iterable[str]) -> bool:
+    """Whether :func:`exact` accepts every number in the texts that Python does."""
     joined = "".join(texts)
     return joined.isascii() and "_" not in joined

@@ -1,4 +1,4 @@
-"""Rows as Parquet, one line a metric: for pandas, duckdb and whatever else reads tables."""
+"""Rows as Parquet, one line per metric, for pandas, duckdb and other readers of tables."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from heavytop.records import SCHEMA, Row
 
 FILE = "rows.parquet"
 _GROUP = 1 << 15
-"""Lines in a row group, which is what is held in memory."""
+"""Lines of a row group, the part held in memory."""
 
 _OF_ROW = {
     **dict.fromkeys(("measure", "case", "system", "integrator", "precision"), "string"),
@@ -32,7 +32,7 @@ _OF_LAW = dict.fromkeys(("exponent", "low", "high"), "float64") | dict.fromkeys(
     ("first", "last", "detects", "lost_at"), "string"
 )
 _OF_DATA = {"inertia": 3, "weight": 0, "centre": 3, "omega": 3, "gamma": 3, "rotor": 3}
-"""How many components each has; 0 for a number."""
+"""Number of components of each; 0 for a scalar."""
 _DATA = [f"{name}{i}" for name, count in _OF_DATA.items() for i in (range(1, count + 1) if count else ("",))]
 COLUMNS = (
     _OF_ROW
@@ -42,31 +42,31 @@ COLUMNS = (
     | dict.fromkeys(_DATA, "float64")
     | {f"{name}_exact": "string" for name in _OF_DATA}
 )
-"""Column -> type.  Numbers that measure something are text, as in the report, with log10 beside them.
+"""Column -> type.  Measured numbers are text, as in the report, with log10 beside them.
 
 inertia1 to rotor3 are the top and the start as floats, and inertia_exact to rotor_exact the same as exact text.
-A growth law is a line of kind "law" whose metric is the name of its series and whose value is its class; a row that has
+A growth law is a line of kind "law" whose metric is the name of its series and whose value is its class; a row with
 neither metric nor law is one line without them.
 """
 
 
 def check_name(path: Path) -> None:
-    """Raises InputError unless the file may hold Parquet, and pyarrow is installed."""
+    """Raises InputError unless the file has the suffix of Parquet, and pyarrow is installed."""
     require_extra("parquet")
     if path.suffix != ".parquet":
         raise InputError(f"{path} is not named as Parquet.", "Give a file that ends in .parquet.")
 
 
 def write(path: Path, rows: Iterable[Row], plan: dict[str, str]) -> None:
-    """Write the file whole or not at all; of the rows only one row group is held.  The plan goes into its metadata.
+    """Writes the file atomically, one row group in memory at a time; the plan goes into its metadata.
 
     Raises InputError where it cannot be written.
     """
     import pyarrow
     from pyarrow.parquet import ParquetWriter
 
-    about = {"heavytop.schema": SCHEMA} | {f"heavytop.plan.{key}": value for key, value in plan.items()}
-    schema = pyarrow.schema([(name, getattr(pyarrow, kind)()) for name, kind in COLUMNS.items()], about)
+    metadata = {"heavytop.schema": SCHEMA} | {f"heavytop.plan.{key}": value for key, value in plan.items()}
+    schema = pyarrow.schema([(name, getattr(pyarrow, kind)()) for name, kind in COLUMNS.items()], metadata)
     stream = lines(rows)
     with atomic_write(path) as file, ParquetWriter(file, schema, compression="zstd") as writer:
         while group := list(islice(stream, _GROUP)):
@@ -75,7 +75,7 @@ def write(path: Path, rows: Iterable[Row], plan: dict[str, str]) -> None:
 
 
 def lines(rows: Iterable[Row]) -> Iterator[tuple[Any, ...]]:
-    """One tuple a metric or growth law, in the order of :data:`COLUMNS`."""
+    """One tuple per metric or growth law, in the order of :data:`COLUMNS`."""
     no_metric, no_law = [None] * len(_OF_METRIC), [None] * len(_OF_LAW)
     for row in rows:
         *same, starts = (getattr(row, name) for name in _OF_ROW)
@@ -90,7 +90,7 @@ def lines(rows: Iterable[Row]) -> Iterator[tuple[Any, ...]]:
 
 
 def _float(text: str) -> float:
-    """The nearest double of exact text, infinite beyond their range."""
+    """The nearest double of exact text, infinite beyond the range of double."""
     number = exact(text)
     try:
         return float(number)
@@ -99,7 +99,7 @@ def _float(text: str) -> float:
 
 
 def _data(row: Row) -> list[float | str | None]:
-    """The top and the start as floats, infinite beyond their range, then as text; None for what there is not."""
+    """The top and the start as doubles, infinite beyond their range, then as text; None for missing data."""
     floats: list[float | None] = []
     texts: list[str | None] = []
     for name, count in _OF_DATA.items():

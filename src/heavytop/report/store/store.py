@@ -1,4 +1,4 @@
-"""Reports on disk: written whole, validated on reading."""
+"""Reports on disk: written atomically, validated on reading."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ _NAME = 200
 _SECONDS = b'"seconds":'
 _decode_seconds = msgspec.json.Decoder(dict[str, Seconds]).decode
 _CHUNK = 1 << 16
-"""Bytes of a brief report whose rows are checked at once: few, so that they are still in the cache when compared."""
+"""Bytes of a brief report whose rows are checked together: few enough to be in the cache when they are compared."""
 
 
 def write(report: Report, directory: Path, rows: Iterable[Row] | None = None) -> Path:
-    """DIRECTORY/report.json, a row a line, and beside it its SHA-256 in the format of ``sha256sum -c``.
+    """Writes DIRECTORY/report.json, one row per line, and its SHA-256 in the format of ``sha256sum -c``.
 
-    rows: in place of those of the report, where they are too many to hold; written one by one.
+    rows: in place of those of the report, where they do not fit into memory; written one by one.
     """
     digest = replace(directory / FILE, _pieces(report, report.rows if rows is None else rows))
     replace(directory / DIGEST, [f"{digest}  {FILE}\n".encode()])
@@ -61,8 +61,8 @@ def _pieces(report: Report, rows: Iterable[Row]) -> Iterator[bytes]:
 
 
 class Brief:
-    """A report as a comparison needs it: its rows are read and checked each time that they are gone through, so that
-    some hundred thousand of them fit into memory.
+    """A report for a comparison: its rows are decoded and checked on each iteration, so that some hundred thousand of
+    them fit into memory.
     """
 
     def __init__(self, file: Path, parts: _Parts, kinds: Kinds) -> None:
@@ -80,10 +80,10 @@ class _Parts(msgspec.Struct, frozen=True):
 
 
 class _Rows:
-    """The rows of a brief report; raises InputError at one that is wrong.
+    """The rows of a brief report; raises InputError at an invalid one.
 
-    twins: the rows of another brief report that is gone through in step: what is there and here the same but for its
-    seconds is neither decoded nor checked again.
+    twins: the rows of another brief report, iterated in step: a row that equals its twin but for its seconds is neither
+    decoded nor checked again.
     """
 
     def __init__(self, file: Path, rows: list[msgspec.Raw], kinds: Kinds) -> None:
@@ -98,15 +98,15 @@ class _Rows:
         return records.of_row(self._decoder.decode(row))
 
     def _twin(self, number: int) -> Row | None:
-        """The row of that number from what its twin is, with its own seconds; None where more differs."""
+        """The row of that number as its twin with its own seconds; None where more differs."""
         twin = None if self.twins is None else self.twins._checked.get(number)
         if self.twins is None or twin is None:
             return None
         texts = [bytes(rows._rows[number]) for rows in (self.twins, self)]
-        if not texts[1].startswith(texts[0][: len(texts[0]) // 2]):  # most others differ there
+        if not texts[1].startswith(texts[0][: len(texts[0]) // 2]):  # a cheap test that most other rows fail
             return None
-        (*rest, old), (*own_rest, new) = map(_without_seconds, texts)
-        if rest != own_rest:
+        (*old_parts, old), (*new_parts, new) = map(_without_seconds, texts)
+        if old_parts != new_parts:
             return None
         if new == old:
             return twin
@@ -123,9 +123,9 @@ class _Rows:
 
     def __iter__(self) -> Iterator[Row]:
         seen: set[int] = set()
-        at_once = max(1, _CHUNK // len(bytes(self._rows[0]))) if self._rows else 1
-        for start in range(0, len(self._rows), at_once):
-            numbers = range(start, min(start + at_once, len(self._rows)))
+        chunk = max(1, _CHUNK // len(bytes(self._rows[0]))) if self._rows else 1
+        for start in range(0, len(self._rows), chunk):
+            numbers = range(start, min(start + chunk, len(self._rows)))
             twins = {number: row for number in numbers if (row := self._twin(number)) is not None}
             rows: list[Row] = []
             try:
@@ -144,9 +144,9 @@ class _Rows:
 
 
 def _without_seconds(text: bytes) -> tuple[bytes, bytes, bytes]:
-    """The text of a row before, after and in its seconds; all of it before these where it does not hold them once."""
-    head, _, rest = text.partition(_SECONDS)
-    seconds, end, tail = rest.partition(b"}")
+    """The text of a row before, after and in its seconds; all of it before them unless it has them exactly once."""
+    head, _, after = text.partition(_SECONDS)
+    seconds, end, tail = after.partition(b"}")
     return (text, b"", b"") if _SECONDS in tail or not end else (head, tail, seconds + end)
 
 
@@ -159,7 +159,7 @@ def read(path: Path, kinds: Kinds) -> Report:
     """The report at ``path``, a file or a directory with a report.json, or with a report.json.gz.
 
     Raises InputError for a file that is missing, truncated, of another program or schema, edited since it was written
-    (where its checksum lies beside it), or inconsistent in itself.
+    (where its checksum lies beside it), or inconsistent.
     """
     file, report = _read(path, Report)
     report = replace_struct(report, rows=[records.of_row(row) for row in report.rows])
@@ -169,7 +169,7 @@ def read(path: Path, kinds: Kinds) -> Report:
 
 
 def read_brief(path: Path, kinds: Kinds) -> Brief:
-    """The report at ``path`` for a comparison; errors in a row are found as the rows are gone through."""
+    """The report at ``path`` for a comparison; errors in a row are found on iteration."""
     return Brief(*_read(path, _Parts), kinds)
 
 
@@ -184,33 +184,33 @@ def _read(path: Path, kind: type[_Content]) -> tuple[Path, _Content]:
     file = path
     try:
         file = path / FILE if path.is_dir() else path
-        if file != path and not file.exists() and (packed := path / f"{FILE}.gz").exists():
-            file = packed
+        if file != path and not file.exists() and (compressed := path / f"{FILE}.gz").exists():
+            file = compressed
         content = read_whole(file)
         if file.suffix == ".gz":
             content = gzip.decompress(content)
     except (OSError, EOFError, zlib.error) as error:
-        inside = sorted(entry.parent.name for entry in file.parent.glob(f"*/{FILE}*"))
-        remedy = f"Name one of the reports in it: {', '.join(dict.fromkeys(inside))}." if inside else REMEDY
+        reports = sorted(entry.parent.name for entry in file.parent.glob(f"*/{FILE}*"))
+        remedy = f"Name one of the reports in it: {', '.join(dict.fromkeys(reports))}." if reports else REMEDY
         raise InputError(f"{str(file)[:_NAME]} holds no report: {why(error)}.", remedy) from None
     if not content.lstrip().startswith(b"{"):
         remedy = f"`heavytop score {file}` reads a trajectory." if file.suffix == ".csv" else REMEDY
         raise InputError(f"{str(file)[:_NAME]} is not a whole report: it is not JSON.", remedy)
-    with ThreadPoolExecutor(1) as beside:
-        digest = beside.submit(_has_its_digest, file, content)
+    with ThreadPoolExecutor(1) as thread:
+        digest = thread.submit(_has_its_digest, file, content)
         try:
             report = msgspec.json.decode(content, type=kind)
             problem = ""
         except _UNREADABLE as error:
             problem = str(error)
-        as_written = digest.result()
+        unchanged = digest.result()
     if problem or report.schema != SCHEMA:
         with suppress(*_UNREADABLE):
             schema = msgspec.json.decode(content, type=_Schema).schema
             if schema != SCHEMA:
                 raise InputError(f"{file} has the schema {schema[:60]!r}, not {SCHEMA!r}.", REMEDY)
         raise InputError(f"{file} is not a whole report: {problem}.", REMEDY)
-    if not as_written:
+    if not unchanged:
         _check_repeats(file, content)
     if not isinstance(report.environment.get("packages", {}), dict):
         raise InputError(f"{file} does not say which packages it was made with.", REMEDY)
@@ -222,7 +222,7 @@ class _Schema(msgspec.Struct):
 
 
 def _check_repeats(file: Path, content: bytes) -> None:
-    """Raises InputError where an object of the file has a key twice, of which the decoder takes the last unsaid."""
+    """Raises InputError where an object of the file repeats a key: the decoder silently takes the last."""
     try:
         json.loads(content, object_pairs_hook=without_repeats)
     except InputError as error:
@@ -232,17 +232,17 @@ def _check_repeats(file: Path, content: bytes) -> None:
 
 
 def _has_its_digest(file: Path, content: bytes) -> bool:
-    """Whether the file's checksum lies beside it; raises InputError where that of another content does."""
-    beside = file.with_name(file.name.removesuffix(".gz") + ".sha256")
-    if not beside.exists():
+    """Whether the file has its checksum beside it; raises InputError where that differs."""
+    checksum = file.with_name(file.name.removesuffix(".gz") + ".sha256")
+    if not checksum.exists():
         return False
-    expected = beside.read_text("utf-8", errors="replace").split()
+    expected = checksum.read_text("utf-8", errors="replace").split()
     if not expected or expected[0] != hashlib.sha256(content).hexdigest():
         raise InputError(f"{file} was changed since it was written: its checksum differs.", REMEDY)
     return True
 
 
-# The environment block of a report: everything outside the plan that can change bits.
+# The environment block of a report: everything outside the plan that may change bits.
 
 
 def environment() -> dict[str, Any]:
@@ -287,7 +287,7 @@ def _target() -> dict[str, Any]:
 
 
 def _llvm_version() -> str:
-    """The version of the compiler inside heyoka's library, which says it nowhere else."""
+    """The version of LLVM in heyoka's library, which exports it nowhere."""
     for file in metadata.files("heyoka") or ():
         if file.name.startswith("libheyoka"):
             with open(file.locate(), "rb") as library, mmap(library.fileno(), 0, access=ACCESS_READ) as content:
