@@ -1,4 +1,4 @@
-"""A comparison in words and a table, for people on a terminal."""
+"""A comparison as sentences and a table on a terminal."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from heavytop.report.document.motions import WorseMotions
 from heavytop.report.render.text import Lines, wrapped
 
 _MOST = 200
-"""Rows listed, and metrics of the table of all: more scroll away."""
+"""Most rows, and most metrics, listed."""
 _STYLE = {Verdict.WORSE: "red", Verdict.BETTER: "green", Verdict.MISSING: "yellow", Verdict.INCOMPARABLE: "yellow"}
 
 
 def comparison(result: Differences, full: bool = False, for_full: str = "--full") -> RenderableType:
-    """Verdict and findings first, then a line for each row that changed, the worst first, then what else differs.
+    """Verdict and findings, a line for each changed row, the worst first, and differences of inputs and environments.
 
-    full: every metric that changed in place of a line for each row.  for_full: the option or command that shows them.
+    full: every changed metric in place of a line per row.  for_full: the option or command that shows these.
     """
     parts: list[RenderableType] = [Text(headline(result), style="bold")]
     parts += [Text(printable(line)) for sentence in result.sentences for line in wrapped(f"- {sentence}")]
@@ -40,7 +40,7 @@ def comparison(result: Differences, full: bool = False, for_full: str = "--full"
 
 
 def _rows(result: Differences, for_full: str) -> Iterator[RenderableType]:
-    """A line for each row, the worst first; broken between words alone."""
+    """A line for each row, the worst first; wrapped between words only."""
     for change in result.rows[:_MOST]:
         verdict = change.verdict.value
         lines = wrapped(printable(f"{verdict:12}  {row_name(change.identity)}: {line(change)}"), " " * 14)
@@ -55,7 +55,7 @@ def _rows(result: Differences, for_full: str) -> Iterator[RenderableType]:
 
 
 def _motions(motions: WorseMotions) -> Iterator[RenderableType]:
-    """The motions of a row that lost most, each with its command, to paste into a shell."""
+    """The motions of a row with the largest losses, each with a command to paste into a shell."""
     if not motions.first:
         return
     yield Text()
@@ -83,13 +83,13 @@ def _cells(finding: Finding) -> list[str | Text]:
 
 
 def headline(result: Differences) -> str:
-    """The verdict and how many findings of each."""
+    """The verdict, and the number of findings of each kind."""
     tally = ", ".join(f"{count} {verdict.value}" for verdict, count in result.tally.items())
     return f"Verdict: {result.verdict} ({tally})"
 
 
 def metric_name(finding: Finding) -> str:
-    """The metric of a finding, or that it is about the row as a whole."""
+    """The metric of a finding, or "whole row"."""
     return finding.metric or "whole row"
 
 

@@ -1,8 +1,8 @@
-"""A report in the formats of tools that follow numbers from commit to commit.
+"""A report in the formats of tools that track numbers from commit to commit.
 
-Every number is such that smaller is better: log10 of the relative error (digits right with a minus sign) and of the
-largest drift of each first integral, none below the eps of its format; exponents of growth laws; seconds.  What is not
-a number in a report (a row that failed, an error that is NaN) is left out here too: :data:`LOST` counts these.
+Of every number smaller is better: log10 of the relative error (digits right with a minus sign) and of the largest drift
+of each first integral, none below the eps of its format; exponents of growth laws; seconds.  Rows without a number (a
+row that failed, an error that is NaN) are left out: :data:`LOST` counts them.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from heavytop.version import version
 LOST = "rows without a number"
 _TOTAL = "heavytop"
 _LARGEST = "error_max"
-"""Metric exported for a row without digits right, one of work against precision."""
+"""Metric exported for a row without digits right, such as one of a work-precision curve."""
 
 
 class Measure(NamedTuple):
@@ -62,7 +62,7 @@ class Measure(NamedTuple):
 
     @property
     def slug(self) -> str:
-        """Its name in lower case, joined by hyphens."""
+        """The name in lower case, joined by hyphens."""
         return "-".join("".join(c if c.isalnum() else " " for c in self.name.lower()).split())
 
 
@@ -88,14 +88,14 @@ def measures(row: Row) -> Iterator[Measure]:
 
 
 def export(report: Report, to: str, kinds: Kinds) -> str:
-    """The text of the file for that tool; raises InputError for another."""
+    """The text of the file in the format ``to``; raises InputError for an unknown format."""
     if to not in FORMATS:
         raise InputError(f"The format of an export must be known; got {quoted(to)}.", f"Use {', '.join(FORMATS)}.")
     return str(resolve_name(FORMATS[to])(report, kinds))
 
 
 def _named(report: Report, kinds: Kinds) -> Iterator[tuple[str, Row | None, list[Measure]]]:
-    """Each row's name and numbers, and the count of the rows that have none."""
+    """Name, row and numbers of each row, then the number of rows without a number."""
     lost = 0
     for row in report.rows:
         quantities = list(measures(row))
@@ -105,7 +105,7 @@ def _named(report: Report, kinds: Kinds) -> Iterator[tuple[str, Row | None, list
 
 
 def _is_lost(row: Row, kinds: Kinds) -> bool:
-    """Whether a row failed, or has an error that is not finite where none may overflow."""
+    """Whether a row failed, or has a non-finite error in a kind that may not overflow."""
     overflowed = row.outcome == "success" and not row.finite and not kind_of(row, kinds).may_overflow
     return failed(row, kinds) or overflowed
 
@@ -135,11 +135,11 @@ def github_action_benchmark(report: Report, kinds: Kinds) -> str:
 
 def asv(report: Report, kinds: Kinds) -> str:
     """The results file of airspeed velocity, version 2: `results/MACHINE/COMMIT-ENVIRONMENT.json`."""
-    about = report.environment
+    environment = report.environment
     machine = {
-        "machine": str(about.get("machine", "unknown")),
-        "os": str(about.get("system", "unknown")),
-        "cpu": str(about.get("processor", "unknown")),
+        "machine": str(environment.get("machine", "unknown")),
+        "os": str(environment.get("system", "unknown")),
+        "cpu": str(environment.get("processor", "unknown")),
     }
     results = {}
     for name, row, numbers in _named(report, kinds):
@@ -150,12 +150,12 @@ def asv(report: Report, kinds: Kinds) -> str:
     return _json(
         {
             "version": 2,
-            "commit_hash": str(about.get("commit")).removesuffix("-dirty"),
+            "commit_hash": str(environment.get("commit")).removesuffix("-dirty"),
             "env_name": "heavytop",
             "date": 0,
-            "params": machine | {"python": str(about.get("python", "unknown"))},
-            "python": str(about.get("python", "unknown")),
-            "requirements": {name: str(text) for name, text in about.get("packages", {}).items()},
+            "params": machine | {"python": str(environment.get("python", "unknown"))},
+            "python": str(environment.get("python", "unknown")),
+            "requirements": {name: str(text) for name, text in environment.get("packages", {}).items()},
             "env_vars": {},
             "result_columns": ["result", "params", "version"],
             "results": results,
@@ -165,7 +165,7 @@ def asv(report: Report, kinds: Kinds) -> str:
 
 
 def junit(report: Report, kinds: Kinds) -> str:
-    """A test case a row: one that failed is an error, one that is not supported is skipped."""
+    """JUnit XML with one test case per row: failed rows are errors, unsupported ones are skipped."""
     bad = sum(_is_lost(row, kinds) for row in report.rows)
     suite = _suite("heavytop", len(report.rows), 0, bad, sum(row.outcome == UNSUPPORTED for row in report.rows))
     for row in report.rows:
@@ -195,18 +195,18 @@ def _xml(suite: ElementTree.Element) -> str:
 
 def metrics_csv(report: Report, kinds: Kinds) -> str:
     """A line for each metric and growth law, with the columns of `--parquet`."""
-    made = io.StringIO()
-    writer = csv.writer(made, lineterminator="\n")
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(COLUMNS)
     writer.writerows(lines(report.rows))
-    return made.getvalue()
+    return buffer.getvalue()
 
 
 def _json(document: Any) -> str:
     return json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
-# A comparison as JUnit XML: one test case a metric, for the test pages of CI systems.
+# A comparison as JUnit XML: one test case per metric, for the test pages of CI systems.
 
 
 _FAILURE = {Verdict.WORSE}
@@ -237,16 +237,16 @@ def comparison_junit(result: Differences) -> str:
 
 
 _MOST, _MOST_METRICS = 50, 100
-"""Rows and quantities of the tables."""
+"""Most rows, and most quantities, of the tables."""
 _COMMENT = 60_000
-"""Characters: a comment of a forge takes no more than 65,536."""
+"""Most characters: forges limit comments to 65,536."""
 _LONGEST = 120
 
 
 def comparison_markdown(result: Differences, page: Path | None = None) -> str:
-    """Verdict and findings, a line for each row with the worst first, differences of the environments, the page.
+    """Verdict and findings, a line per row with the worst first, differences of the environments, the page.
 
-    Where that is too long for a comment, quantities and then rows are left out; the findings never are.
+    Where the text is too long for a comment, quantities and then rows are left out, but never the findings.
     """
     head = ["### heavytop: " + headline(result), "", *(f"- {escaped(sentence)}" for sentence in result.sentences), ""]
     rows, metrics = (_rows(result), _metrics(result)) if result.rows else ([], [])
@@ -255,7 +255,7 @@ def comparison_markdown(result: Differences, page: Path | None = None) -> str:
         changes = _table(("", "baseline", "candidate"), result.environment[:_MOST], words=3)
         end += ["<details><summary>Inputs or environments differ</summary>", "", *changes, "", "</details>", ""]
     if page is not None:
-        # no link: a comment does not lie beside the file
+        # no link: the file is not beside the comment
         end += [f"Both on the same axes: {escaped_cell(page.name)}.", ""]
     texts = ("\n".join(lines) for lines in ([*head, *rows, *metrics, *end], [*head, *rows, *end], head))
     return next((text for text in texts if len(text) <= _COMMENT), "\n".join(head))
@@ -268,7 +268,7 @@ def _rows(result: Differences) -> list[str]:
 
 
 def _metrics(result: Differences) -> list[str]:
-    """Changes of each row, largest, rms and last value of one quantity in one line; folded."""
+    """Changes of each row, with largest, rms and last value of a quantity in one line; collapsed."""
     columns = ("verdict", "row", "quantity", "baseline", "candidate", "why")
     changes = ((change, *quantity) for change in result.rows[:_MOST] for quantity in folded(change))
     cells = (
@@ -282,7 +282,7 @@ def _metrics(result: Differences) -> list[str]:
 
 
 def _table(columns: Sequence[str], rows: Iterable[Iterable[str]], words: int, left: bool = False) -> list[str]:
-    """A table; its first ``words`` columns are words, the others are numbers; ``left``: not the last."""
+    """A table; its first ``words`` columns are text, the others are numbers.  left: the last column is text too."""
     last = len(columns) - 1
     rule = ["---" if index < words or (left and index == last) else "---:" for index in range(len(columns))]
     head, *lines = (list(map(escaped_cell, row)) for row in (columns, *rows))
@@ -290,21 +290,21 @@ def _table(columns: Sequence[str], rows: Iterable[Iterable[str]], words: int, le
 
 
 def escaped_cell(text: str) -> str:
-    """Text in a cell of a table, cut where it is long."""
+    """Text in a cell of a table, truncated where it is long."""
     text = " ".join(printable(text).split())
     return escaped(text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…")
 
 
 def escaped(text: str) -> str:
-    """Text that Markdown takes as it is, without line breaks."""
+    """Text escaped for Markdown, without line breaks."""
     return re.sub(r"([\\`*_{}\[\]<>|#~@&])", r"\\\1", " ".join(printable(text).split()))
 
 
-# What a report says, for programs and for pull requests: its document as JSON and as Markdown.
+# The document of a report as JSON, for programs, and as Markdown, for pull requests.
 
 
 def to_json(report: Report, kinds: Kinds) -> dict[str, Any]:
-    """The blocks of each kind, without charts: a cell is text, or an object that says what it is."""
+    """The blocks of each kind, without charts: a cell is text, or an object with its type."""
     blocks = document(report, kinds, In.FULL)
     kinds_blocks = [{"kind": name, "blocks": [_block(block) for block in blocks]} for name, blocks in blocks.items()]
     return {"plan": report.plan, "measurements": len(report.rows), "kinds": kinds_blocks}
@@ -346,22 +346,22 @@ def to_markdown(report: Report, kinds: Kinds) -> str:
     """GitHub-flavoured Markdown: the headlines, then the notes, tables and cards of each kind."""
     kinds_blocks = document(report, kinds, In.FULL)
     plan = f"### Plan {escaped(report.plan.get('name', '?'))}: {plural(len(report.rows), 'measurement')}"
-    lines = [plan, "", *(f"- {_said(headline)}" for headline in headlines(kinds_blocks, kinds)), ""]
+    lines = [plan, "", *(f"- {_sentence(headline)}" for headline in headlines(kinds_blocks, kinds)), ""]
     for blocks in kinds_blocks.values():
         lines += [line for block in blocks if not isinstance(block, Headline) for line in _markdown(block)]
     return "\n".join(lines) + "\n"
 
 
-def _said(block: Headline | Note) -> str:
+def _sentence(block: Headline | Note) -> str:
     return (f"**{block.word.text}** " if block.word else "") + escaped(block.text)
 
 
 def _markdown(block: Block) -> Iterator[str]:
     match block:
         case Note():
-            yield from (_said(block), "")
+            yield from (_sentence(block), "")
         case Card():
-            yield from (f"#### {escaped(block.title)}", "", *(f"- {_said(line)}" for line in block.lines), "")
+            yield from (f"#### {escaped(block.title)}", "", *(f"- {_sentence(line)}" for line in block.lines), "")
             if block.table:
                 yield from _markdown(block.table)
         case Table():

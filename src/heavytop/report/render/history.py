@@ -34,8 +34,8 @@ _LEGEND = "▲ worse than before  ▼ better  ≠ incomparable  ✗ missing  + n
 
 
 class Track(msgspec.Struct, frozen=True):
-    """One metric of one row.  values: one a report, None where it has none.  steps: the verdict that each change from
-    one report to the next has, by the number of the later report, the same left out; with the reason.
+    """One metric of one row.  values: one per report, None where it has none.  steps: verdict and reason of each change
+    from one report to the next, by the number of the later report.
     """
 
     row: Identity
@@ -45,7 +45,7 @@ class Track(msgspec.Struct, frozen=True):
 
 
 def history(reports: Sequence[AnyReport], policy: Policy, kinds: Kinds) -> list[Track]:
-    """The tracks of every row and metric, in the order in which they first come up."""
+    """The tracks of every row and metric, in order of first appearance."""
     tracks: dict[tuple[Identity, str], Track] = {}
 
     def track(row: Identity, metric: str) -> Track:
@@ -95,7 +95,7 @@ def history_json(names: Sequence[str], tracks: Sequence[Track]) -> dict[str, Any
 
 
 def history_text(names: Sequence[str], tracks: Sequence[Track]) -> RenderableType:
-    """A table with one column a report, steps marked."""
+    """A table with one column per report, steps marked."""
     heads = [Text(printable(f"{number}  {name}")) for number, name in enumerate(names, 1)]
     if not tracks:
         return Group(
@@ -108,18 +108,18 @@ def history_text(names: Sequence[str], tracks: Sequence[Track]) -> RenderableTyp
 
 
 def cells(track: Track) -> list[str]:
-    """A line of the table: row, metric, the value and the mark of each report."""
+    """A line of the table: row, metric, and the value and mark of each report."""
     marks = [MARK[track.steps[number][0]] if number in track.steps else " " for number in range(len(track.values))]
     values = [f"{short(value or '-')} {mark}" for value, mark in zip(track.values, marks, strict=True)]
     return [_row(track), track.metric or "whole row", *values]
 
 
 def _row(track: Track) -> str:
-    """The row by name, with the versions of its program, each once."""
+    """The name of the row, with the versions of its program."""
     return f"{row_name(track.row)} {' → '.join(dict.fromkeys(filter(None, track.row.versions)))}".rstrip()
 
 
-# A history as a page: one chart for each row over the reports, every step beyond noise marked.
+# A history as a page: for each row a chart over the reports, with every step beyond noise marked.
 
 
 MOST_PICTURES, MOST_CURVES = 120, 6
@@ -129,15 +129,14 @@ _STEPS = {
     Verdict.INCOMPARABLE: Key("incomparable", 5, "D", line=False),
 }
 _NAME = 12
-"""Characters of a report's name on an axis."""
+"""Most characters of a report's name on an axis."""
 
 
 def history_page(names: Sequence[str], reports: Sequence[AnyReport], tracks: Sequence[Track]) -> str:
     """The page of ``tracks`` over ``reports``; the same input gives the same bytes.
 
-    names: of the reports, the oldest first.  A metric without a positive number at two reports or more is in the table
-    of its row alone; of a row the first six metrics are drawn, and of more than 120 rows the first, those with steps
-    before the others.
+    names: of the reports, the oldest first.  A metric with fewer than two positive numbers is only in the table of its
+    row; at most six metrics of a row are drawn, and at most 120 rows, those with steps first.
     """
     from heavytop.report.render.page import render
 
@@ -147,7 +146,7 @@ def history_page(names: Sequence[str], reports: Sequence[AnyReport], tracks: Seq
     return render(
         "history.html.j2",
         reports=[
-            [str(number), clip(name), clip(str(report.plan.get("name", "?"))), *_made(report)]
+            [str(number), clip(name), clip(str(report.plan.get("name", "?"))), *_version_and_commit(report)]
             for number, (name, report) in enumerate(zip(names, reports, strict=True), 1)
         ],
         tally={verdict.value: steps.count(verdict) for verdict in Verdict if verdict in steps},
@@ -157,17 +156,17 @@ def history_page(names: Sequence[str], reports: Sequence[AnyReport], tracks: Seq
     )
 
 
-def _made(report: AnyReport) -> tuple[str, str]:
-    """Version of heavytop and commit of a report, as far as it says so."""
+def _version_and_commit(report: AnyReport) -> tuple[str, str]:
+    """Version of heavytop and commit of a report; "" where unknown."""
     version = report.environment.get("packages", {}).get("heavytop", "")
     return clip(str(version)), clip(str(report.environment.get("commit") or "")[:12])
 
 
 def _ticks(names: Sequence[str], reports: Sequence[AnyReport]) -> list[str]:
-    """Label of each report on the axis: heavytop's version, else the name of its folder, else its number, the
-    first by which all differ.
+    """Label of each report on the axis: heavytop's version, the name of its folder, or its number, the first of these
+    by which all differ.
     """
-    versions = [_made(report)[0] for report in reports]
+    versions = [_version_and_commit(report)[0] for report in reports]
     if all(versions) and len(set(versions)) == len(versions):
         return [clip(version, _NAME) for version in versions]
     folders = [clip(PurePath(name).name or name, _NAME) for name in names]
@@ -175,18 +174,18 @@ def _ticks(names: Sequence[str], reports: Sequence[AnyReport]) -> list[str]:
 
 
 def _sections(ticks: Sequence[str], tracks: Sequence[Track]) -> tuple[list[Section], list[Section]]:
-    """One for each row of the reports, in their order: those with a step, and those without."""
+    """A section for each row of the reports, in their order: those with a step, and those without."""
     parts: tuple[list[Section], list[Section]] = [], []
     rows: dict[str, list[Track]] = {}
     for track in tracks:
         rows.setdefault(_row(track), []).append(track)
     drawn = sorted(rows, key=lambda name: not any(track.steps for track in rows[name]))[:MOST_PICTURES]
-    for number, (name, own) in enumerate(rows.items()):
+    for number, (name, members) in enumerate(rows.items()):
         section = Section(f"row-{number}", clip(name, 120), [])
         section.columns = ["metric", *(str(index) for index in range(1, len(ticks) + 1))]
-        section.rows = [[clip(track.metric or "whole row"), *_page_cells(track)] for track in own]
+        section.rows = [[clip(track.metric or "whole row"), *_page_cells(track)] for track in members]
         drawable = sorted(
-            (track for track in own if len(_points(track)) > 1),
+            (track for track in members if len(_points(track)) > 1),
             key=lambda track: (not track.steps, track.metric.endswith(("_rms", "_final"))),
         )
         if drawable and name in drawn:
@@ -194,7 +193,7 @@ def _sections(ticks: Sequence[str], tracks: Sequence[Track]) -> tuple[list[Secti
         missing = len(drawable) - (MOST_CURVES if section.pictures else 0)
         if missing > 0:
             section.notes.append(f"{missing} more in the table alone; --metric and --case choose which are drawn.")
-        parts[not any(track.steps for track in own)].append(section)
+        parts[not any(track.steps for track in members)].append(section)
     return parts
 
 
@@ -207,7 +206,7 @@ def _page_cells(track: Track) -> list[str]:
 
 
 def _points(track: Track) -> dict[int, float]:
-    """log10 |value| by the number of the report, where there is one; none for verdicts, which are 0 or 1."""
+    """log10 |value| by the number of the report, where it exists; none for verdicts, which are 0 or 1."""
     if set(track.values) <= {"0", "1", None}:
         return {}
     logs = {number: logarithm(value) for number, value in enumerate(track.values)}
@@ -215,7 +214,7 @@ def _points(track: Track) -> dict[int, float]:
 
 
 _REASONS = 2
-"""Steps, at most, that are explained below a picture; the numbers have all."""
+"""Most steps explained below a picture; the table marks all."""
 
 
 def _picture(section: Section, tracks: Sequence[Track], ticks: Sequence[str], name: str) -> Picture:

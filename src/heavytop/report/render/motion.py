@@ -1,4 +1,4 @@
-"""One motion, computed or known, as tables for people."""
+"""One motion, computed or proven, as tables."""
 
 from __future__ import annotations
 
@@ -26,26 +26,26 @@ from heavytop.report.document.document import integral_text, short
 from heavytop.top.attitude import Output, perpendicular, rows_of
 from heavytop.top.equations import NAMES, VARIABLES
 
-# The table of one motion, computed or known: what a terminal, a CSV file and a LaTeX table show of it.
+# The table of one motion, computed or proven, for a terminal, a CSV file and a LaTeX table.
 
 
 _GREEK = {"Ω": r"\Omega", "γ": r"\gamma", "ξ": r"\xi", "φ": r"\varphi", "θ": r"\theta", "ψ": r"\psi"}
 _BODY = ("mass", "gravity", "inertia", "about", "weight", "centre", "rotor")
 _DATA = (*_BODY, "omega", "gamma", "start_quaternion", "start_matrix", "start_attitude", "xi")
 _LINES = 45
-"""Lines of a LaTeX table that fit on a page."""
+"""Most lines of a LaTeX table on one page."""
 _DIGITS_A_LINE = 48
-"""Digits of a number on a line of a LaTeX table; a multiple of 3, in which they are grouped."""
+"""Digits of a number on a line of a LaTeX table; a multiple of 3, the size of a group."""
 _MORE_BITS = 64
 _BESIDE = 64
-"""Characters of a value and its radius beside each other on a terminal of 80 columns; more stand below each other."""
+"""Most characters of a value and its radius on one line of a terminal of 80 columns; else the radius is below."""
 _KNOWN = ("precision", "integrator", "outcome", "steps")
 """Facts of a computed motion, by the keys that `heavytop score` reads."""
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """name: in a CSV file.  label: on a terminal.  tex: in math mode."""
+    """A column.  name: in a CSV file.  label: on a terminal.  tex: in math mode."""
 
     name: str
     label: str
@@ -54,10 +54,10 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class MotionTable:
-    """The values of a motion at its times, and the facts that make them citable.
+    """The values of a motion at its times, and the facts needed to cite them.
 
-    facts: key and text, in order.  times: as they were given.
-    values: one line a time, (value, radius) for each column, as text; the radius of what is not proven is None.
+    facts: key and text, in order.  times: as text.
+    values: one line per time, (value, radius) for each column, as text; radius None for values that are not proven.
     """
 
     facts: tuple[tuple[str, str], ...]
@@ -66,11 +66,11 @@ class MotionTable:
     values: tuple[tuple[tuple[str, str | None], ...], ...]
 
     def of_case(self, name: str | None) -> MotionTable:
-        """This table with the case that the motion is among its facts; as it is where no case has these data."""
+        """This table with the name of the case among its facts; unchanged for None."""
         return self if name is None else replace(self, facts=(*self.facts[:2], ("name", name), *self.facts[2:]))
 
     def csv(self) -> str:
-        """A header of comments, the names of the columns, a line a time; radii in the last columns.
+        """A header of comments, the names of the columns, a line per time; radii in the last columns.
 
         `heavytop score` reads it.
         """
@@ -84,9 +84,9 @@ class MotionTable:
         return "\n".join(lines) + "\n"
 
     def latex(self) -> str:
-        """A table with siunitx and booktabs: a line a number, its radius behind ±; the facts as comments and caption.
+        """A table with siunitx and booktabs: a line per number, its radius after ±; the facts as comments and caption.
 
-        Of more lines than a page has it is a longtable.
+        It is a longtable where it is longer than a page.
         """
         body = [self._tex_lines(index) for index in range(len(self.times))]
         long = sum(map(len, body)) > _LINES
@@ -110,13 +110,13 @@ class MotionTable:
         facts = {key: _one_line(text) for key, text in self.facts}
         facts["command"] = _without_paths(facts["command"])
         digest = hashlib.sha256(f"{facts['command']} {facts['version']}".encode()).hexdigest()
-        made = ("method", "method of the attitude", "source", "precision", "integrator", "digits")
+        methods = ("method", "method of the attitude", "source", "precision", "integrator", "digits")
         fields = {
             "author": "{The heavytop authors}",
             "title": _bibtex(f"{facts['system']}: a motion by heavytop {facts['version']}"),
             "version": _bibtex(facts["version"]),
             "howpublished": r"\texttt{" + _bibtex(facts["command"]) + "}",
-            "note": _bibtex("; ".join(f"{key}: {facts[key]}" for key in made if key in facts)),
+            "note": _bibtex("; ".join(f"{key}: {facts[key]}" for key in methods if key in facts)),
         }
         lines = [f"  {name} = {{{text}}}," for name, text in fields.items()]
         return "\n".join([f"@misc{{heavytop-{digest[:12]},", *lines, "}"]) + "\n"
@@ -133,7 +133,7 @@ class MotionTable:
 
 
 def of_motion(motion: Motion, command: str, version: str) -> MotionTable:
-    """The table of a computed motion: states, ξ and Euler angles where asked for, outputs."""
+    """The table of a computed motion: states, ξ and Euler angles where requested, outputs."""
     columns, parts, document = _states(), [motion.states], motion.to_json()
     if motion.attitude is not None and motion.angles is not None:
         columns = (*columns, *_xi(), *(Column(name, mark, _GREEK[mark]) for name, mark in _ANGLES))
@@ -144,7 +144,7 @@ def of_motion(motion: Motion, command: str, version: str) -> MotionTable:
 
 
 def of_reference(reference: Reference, outputs: Sequence[Output], command: str, version: str) -> MotionTable:
-    """The table of a known motion: states, ξ where asked for, outputs, each with its radius."""
+    """The table of a proven motion: states, ξ where requested, outputs, each with its radius."""
     columns, parts = _states(), [reference.states]
     if reference.attitude is not None:
         columns, parts = (*columns, *_xi()), [*parts, reference.attitude]
@@ -164,7 +164,7 @@ def _table(
     of_output: Callable[[Output], list[Any]],
     times: Sequence[str],
 ) -> MotionTable:
-    """The table of some parts of a motion, each a line a time, and of its outputs; numbers are texts or balls."""
+    """The table of parts of a motion, each with a line per time, and of its outputs; numbers are texts or balls."""
     columns = (*columns, *(column for output in outputs for column in _columns_of(output)))
     parts = [*parts, *([_flat(value) for value in of_output(output)] for output in outputs)]
     lines = (chain(*line) for line in zip(*parts, strict=True))
@@ -215,7 +215,7 @@ def _made_by(command: str, version: str) -> list[tuple[str, str]]:
 
 
 def _data_of(document: dict[str, Any]) -> list[tuple[str, str]]:
-    """The body, the start and ξ at t = 0, by the keys of the JSON document; R at t = 0 where no other key tells it."""
+    """The body, the start and ξ at t = 0, by the keys of the JSON document; R at t = 0 where no other key gives it."""
     facts = [(key, document[key]) for key in _DATA if document.get(key) is not None]
     if document.get("xi") is not None and not any(key.startswith("start_") for key, _ in facts):
         x, y, z = (exact(part) for part in document["gamma"])
@@ -238,7 +238,7 @@ def _outputs_of(outputs: Sequence[Output]) -> list[tuple[str, str]]:
 
 
 def _wide_format(reference: Reference) -> str:
-    """A format in which data and times are rounded so little that the numbers of a reference do not show it.
+    """A format in which the rounding of data and times does not affect the digits of a reference.
 
     `heavytop score` rounds the data of a file to the format that the file names.
     """
@@ -253,8 +253,8 @@ def _one_line(text: str) -> str:
 
 def _caption(facts: dict[str, str]) -> str:
     """Caption that makes the table readable alone."""
-    made = ("digits", "method") if "digits" in facts else ("precision", "integrator")
-    known = [(key, _escaped(facts[key])) for key in ("name", *_DATA, *made) if key in facts]
+    methods = ("digits", "method") if "digits" in facts else ("precision", "integrator")
+    known = [(key, _escaped(facts[key])) for key in ("name", *_DATA, *methods) if key in facts]
     named_facts = "; ".join(f"{_escaped(_one_line(key))} " + text.replace("/", r"/\allowbreak ") for key, text in known)
     return f"{named_facts}. heavytop {_escaped(facts['version'])}."
 
@@ -266,13 +266,13 @@ def _escaped(text: str) -> str:
 
 
 def _without_paths(command: str) -> str:
-    """The command without the files that it writes, and with those that it reads by their names."""
+    """The command without its output files, and with the names, not paths, of its input files."""
     options = tuple(f"{option}=" for option in (*_WRITTEN, *_READ))
     words = [w for word in shlex.split(command) for w in (word.split("=", 1) if word.startswith(options) else [word])]
     kept = []
-    for before, word in pairwise(["", *words]):
-        if word not in _WRITTEN and (before not in _WRITTEN or word.startswith("--")):
-            kept.append(Path(word).name if before in _READ else word)
+    for previous, word in pairwise(["", *words]):
+        if word not in _WRITTEN and (previous not in _WRITTEN or word.startswith("--")):
+            kept.append(Path(word).name if previous in _READ else word)
     return shlex.join(kept)
 
 
@@ -281,7 +281,7 @@ _ACCENTS = {"\u0300": r"\`", "\u0301": r"\'", "\u0302": r"\^", "\u0308": r"\""}
 
 
 def _bibtex(text: str) -> str:
-    """Text of ASCII in which braces are balanced and accents are those of TeX."""
+    """ASCII text with balanced braces and the accents of TeX."""
     text = text.translate(str.maketrans("{}", "()"))
     parts: list[str] = []
     for letter in unicodedata.normalize("NFD", _escaped(text)):
@@ -299,7 +299,7 @@ def _tex_number(text: str) -> str:
 
 
 def _tex_parts(value: str, radius: str | None) -> list[str]:
-    """A number and its radius, the digits on as many lines as they take."""
+    """A number and its radius, on as many lines as the digits need."""
     if value in ("nan", "inf", "-inf"):
         return ["undefined" if value == "nan" else rf"${value.replace('inf', chr(92) + 'infty')}$"]
     mantissa, _, power = value.lower().partition("e")
@@ -314,7 +314,7 @@ def _tex_parts(value: str, radius: str | None) -> list[str]:
     return [rf"$\num{{{first}}}$", *(rf"$\quad {part}$" for part in more)]
 
 
-# Proven derivatives of a motion as lines for people: one a derivative, so that nothing is cut at 80 columns.
+# Proven derivatives of a motion on a terminal: one per line, so that nothing is truncated at 80 columns.
 
 
 def derivative_lines(times: Sequence[str], derivatives: Derivatives) -> list[RenderableType]:
@@ -340,11 +340,11 @@ def _entries(time: str, matrix: Sequence[Sequence[Ball]], columns: Sequence[str]
 
 
 def motion_text(motion: Motion, table: MotionTable) -> RenderableType:
-    """States, what was asked for beside them, and the drift of the first integrals."""
+    """States, further requested outputs, and the drift of the first integrals."""
     run = motion.trajectory
     precision = run.problem.precision
     head = f"{run.problem.system.name} in {precision.name} ({precision.bits} bits): {run.outcome.message}"
-    if run.order:  # some peers tell neither
+    if run.order:  # some peers report neither
         head += f", {run.steps} steps of order {run.order}"
     parts: list[RenderableType] = [Text(head), *_attitude_at_start(table)]
     parts += _at_each_time(table)
@@ -366,7 +366,7 @@ def motion_text(motion: Motion, table: MotionTable) -> RenderableType:
 
 
 def reference_text(reference: Reference, table: MotionTable) -> RenderableType:
-    """Proven states, and what was asked for beside them, with the radius of each number."""
+    """Proven states and further requested outputs, with the radius of each number."""
     parts: list[RenderableType] = [Text(f"{reference.system}, {reference.digits} digits; {reference.method}")]
     if reference.attitude_method not in (None, reference.method):
         parts.append(Text(f"attitude: {reference.attitude_method}"))
@@ -377,16 +377,16 @@ def reference_text(reference: Reference, table: MotionTable) -> RenderableType:
 
 
 def _attitude_at_start(table: MotionTable) -> list[RenderableType]:
-    """ξ(0), where there is an attitude."""
+    """ξ(0), where the table has an attitude."""
     facts = dict(table.facts)
     return [Text(f"xi(0) = ({facts['xi']})")] if "xi" in facts else []
 
 
 def _at_each_time(table: MotionTable) -> list[RenderableType]:
-    """A table for each time, a line a number; digits that are too many for a line go on below each other."""
+    """A table for each time, a line per number; long numbers continue on further lines."""
     parts: list[RenderableType] = []
     numbers = ((value, radius or "") for line in table.values for value, radius in line)
-    below = max((len(value) + len(radius) for value, radius in numbers), default=0) > _BESIDE
+    two_lines = max((len(value) + len(radius) for value, radius in numbers), default=0) > _BESIDE
     for time, line in zip(table.times, table.values, strict=True):
         lines = Table(box=None, show_header=False)
         lines.add_column(no_wrap=True)
@@ -395,21 +395,21 @@ def _at_each_time(table: MotionTable) -> list[RenderableType]:
         lines.add_row("t", Text(time, overflow="fold"))
         for column, (value, radius) in zip(table.columns, line, strict=True):
             error = "" if radius is None else f"± {radius}"
-            shown = f"{value}\n{error}" if below and error else value
-            lines.add_row(column.label, Text(shown, overflow="fold"), "" if below else error)
+            shown = f"{value}\n{error}" if two_lines and error else value
+            lines.add_row(column.label, Text(shown, overflow="fold"), "" if two_lines else error)
         parts += [Text(), lines]
     return parts
 
 
 def _undefined(table: MotionTable) -> list[RenderableType]:
-    """Error text where Euler angles are not defined."""
-    places = [
+    """A sentence about times at which Euler angles are undefined."""
+    times = [
         time
         for time, line in zip(table.times, table.values, strict=True)
         for column, (value, _) in zip(table.columns, line, strict=True)
         if value == "nan" and column.label[:2] in ("a ", "c ")
     ]
-    if not places:
+    if not times:
         return []
-    at = ", ".join(list(dict.fromkeys(places))[:6])
+    at = ", ".join(list(dict.fromkeys(times))[:6])
     return [Text(), Text(f"At t = {at} the first and the last Euler angle are not defined (gimbal lock).")]

@@ -1,4 +1,4 @@
-"""A report, or a comparison of two, as one self-contained page: no script, nothing loaded from elsewhere."""
+"""A report, or a comparison of two, as one self-contained page, without scripts and external resources."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def report_page(report: Report, kinds: Kinds) -> str:
     blocks_by_kind = document(report, kinds, In.PAGE)
     blocks = [block for blocks in blocks_by_kind.values() for block in blocks]
     not_finite = [row for row in report.rows if row.outcome == "success" and not row.finite]
-    # of some kinds a finding about the integrator, in its chart
+    # for some kinds a result about the integrator, shown in a chart
     aborted = (row for row in report.rows if row.outcome not in ("success", *UNMEASURED))
     groups: dict[str, list[Row]] = {}
     for row in rows:
@@ -104,14 +104,14 @@ _FAILED = ("case", "measure", "integrator", "format", "outcome", "reached |t|", 
 
 
 def _failure(row: Row) -> list[Cell]:
-    """A measurement that failed: where it stopped, and why where it was not measured."""
+    """A failed measurement: the time reached, and the reason where nothing was measured."""
     names = (row.case, row.measure.replace("_", " "), row.integrator, row.precision)
     reached = (Word(clip(row.outcome, 30)), short(row.time_reached), short(row.horizon), str(row.steps or "-"))
     return [*map(clip, names), *reached, "" if row.metrics else clip(row.against, 200)]
 
 
 def comparison_page(baseline: Report, candidate: Report, comparison: Differences, kinds: Kinds) -> str:
-    """The page of a comparison: verdict, changed rows, both reports on the same axes."""
+    """The page of a comparison: verdict, changed rows, and both reports on the same axes."""
     sources = [("baseline", baseline), ("candidate", candidate)]
     return render(
         "comparison.html.j2",
@@ -128,21 +128,21 @@ def comparison_page(baseline: Report, candidate: Report, comparison: Differences
 
 
 def sections(sources: Sources, kinds: Kinds, first: Iterable[str] = ()) -> list[Section]:
-    """The parts of the page that have pictures, each from the rows of the kinds that ask for it, and the tables."""
-    asked: dict[Make, set[str]] = {}
+    """The sections of the page: those with pictures, each from the rows of the kinds that show it, and the tables."""
+    names_by_make: dict[Make, set[str]] = {}
     tables: dict[str, Section] = {}
     for source, report in sources:
         for name, blocks in document(report, kinds, In.PAGE).items():
             for block in blocks:
                 if isinstance(block, Chart):
-                    asked.setdefault(block.make, set()).update(kinds if block.of_all else {name})
+                    names_by_make.setdefault(block.make, set()).update(kinds if block.of_all else {name})
                 elif isinstance(block, Table):
                     _add(tables, block, source)
     made: list[Section | None] = []
     if has_extra("plots"):
         with quiet_style():
-            made = [make(_only(sources, names), first) for make, names in asked.items()]
-    elif asked:
+            made = [make(_only(sources, names), first) for make, names in names_by_make.items()]
+    elif names_by_make:
         made = [Section("charts", "Charts", [f"Charts need the extra plots: {install('plots')}"])]
     ordered = [*sorted((section for section in made if section), key=lambda section: section.place), *tables.values()]
     for section in ordered:
@@ -151,7 +151,7 @@ def sections(sources: Sources, kinds: Kinds, first: Iterable[str] = ()) -> list[
 
 
 def _only(sources: Sources, names: Container[str]) -> Sources:
-    """The sources with the rows of these kinds alone."""
+    """The sources, restricted to rows of these kinds."""
     return [
         (source, replace_struct(report, rows=[row for row in report.rows if row.key.kind in names]))
         for source, report in sources
@@ -159,7 +159,7 @@ def _only(sources: Sources, names: Container[str]) -> Sources:
 
 
 def _add(tables: dict[str, Section], table: Table, source: str) -> None:
-    """Take the rows of a table of a report into the section of that title."""
+    """Adds the rows of a table of a report to the section with its title."""
     new = Section(f"table-{len(tables)}", table.title, list(table.notes), columns=list(table.columns))
     for name, *cells in table.rows:
         shown = [cell if isinstance(cell, Word) else clip(cell_text(cell), 180) for cell in cells]
@@ -167,18 +167,18 @@ def _add(tables: dict[str, Section], table: Table, source: str) -> None:
 
 
 def detailed(rows: Sequence[Row]) -> tuple[list[Row], int]:
-    """The rows shown one by one, the first and the worst of the others, and how many are left out."""
+    """The rows shown one by one, the first and the worst of the others, and the number left out."""
 
     def goodness(row: Row) -> tuple[bool, bool, float]:
         kept = digits_kept(row)
         return row.outcome == "success", row.finite, math.inf if kept is None else kept
 
-    rest = sorted(rows[MOST_ROWS:], key=goodness)[:MOST_WORST]
-    return [*rows[:MOST_ROWS], *rest], max(0, len(rows) - MOST_ROWS - len(rest))
+    worst = sorted(rows[MOST_ROWS:], key=goodness)[:MOST_WORST]
+    return [*rows[:MOST_ROWS], *worst], max(0, len(rows) - MOST_ROWS - len(worst))
 
 
 def main_metric(row: Row, kinds: Kinds) -> str:
-    """Beginning of a line about a row: what its kind says, else an error if it has one that is a number."""
+    """The beginning of a line about a row: that of its kind, else its first error that is a number."""
     if row.metrics and (beginning := kind_of(row, kinds).line(row)):
         return beginning
     errors = [name for name in (RELATIVE.text, ERRORS[0].text) if name in row.metrics]
@@ -193,7 +193,7 @@ _MAIN = {RELATIVE.text: "relative error", ERRORS[0].text: "error"}
 
 
 def metric_cells(row: Row) -> list[list[str]]:
-    """Name, value, and rounding noise in decades where one is known, of the first metrics."""
+    """Name, value, and rounding noise in decades where known, of the first metrics."""
     metrics = list(islice(row.metrics.items(), MOST_METRICS))
     columns = 3 if any(metric.band for _, metric in metrics) else 2
     return [
@@ -207,7 +207,7 @@ def metric_cells(row: Row) -> list[list[str]]:
 
 
 def quantities(changed: Change) -> list[list[Cell]]:
-    """Each quantity of a row that changed with the statistics of it that did, and the worst finding about it."""
+    """Each changed quantity of a row with its changed statistics and its worst finding."""
     return [
         [
             clip(statistics(changed, name, metrics) or "whole row", 80),
@@ -220,7 +220,7 @@ def quantities(changed: Change) -> list[list[Cell]]:
 
 
 def commands(report: Report) -> list[str]:
-    """How to make the report again, as far as the report knows."""
+    """The commands that reproduce the report, as far as it determines them."""
     plan = {"file": report.plan["name"]} if report.plan.get("name", "") in BUILT_IN else report.plan
     version = report.environment.get("packages", {}).get("heavytop", "")
     commit = str(report.environment.get("commit") or "").removesuffix("-dirty")
@@ -235,12 +235,12 @@ def commands(report: Report) -> list[str]:
 
 
 def unbroken(text: str) -> Markup:
-    """The text escaped, each number such as 6.85E-49 in one piece, which browsers would break behind its sign."""
+    """The text escaped, with numbers such as 6.85E-49 unbreakable: browsers would break them after the sign."""
     return Markup(re.sub(r"[\d.]+[eE]-\d+", r'<span class="number">\g<0></span>', str(escape(text))))
 
 
 def render(template: str, **context: Any) -> str:
-    """A template of this room as text, everything escaped."""
+    """A template of this package rendered as text, everything escaped."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -268,19 +268,19 @@ def render(template: str, **context: Any) -> str:
     return environment.get_template(template).render(**context)
 
 
-# What rows come to: the headlines of kinds of measurement, and the tables that several kinds share.
+# Conclusions from rows: the headlines of kinds of measurement, and the tables that several kinds share.
 
 
-_ALONG = Quantity(SOLUTION_ERROR, "along")
+_ERROR_ALONG = Quantity(SOLUTION_ERROR, "along")
 _LOST = 3
-"""Motions, at most, that a headline says have lost all digits."""
+"""Most motions that a headline names as having lost all digits."""
 _HOW = {"exponential": "exponentially", "bounded": "within a bound", "unresolved": "by no law that is resolved"}
 
 
 def digits_headline(rows: Sequence[Row]) -> Headline | None:
-    """The fewest digits right at the longest horizon: of a third-party integrator beside heyoka's, else of heyoka
-    beside those of multiword.  A motion whose reference is valid until an earlier time, for the format has lost all
-    significant digits, counts as the last choice.
+    """The fewest digits right at the longest horizon: of a third-party integrator with heyoka's, else of heyoka with
+    those of multiword.  A motion whose reference ends before the horizon, where the format has lost all significant
+    digits, is the last choice.
     """
     finished = [row for row in rows if row.outcome == "success"]
     known = [(row, kept) for row in finished if (kept := digits_kept(row)) is not None]
@@ -290,9 +290,9 @@ def digits_headline(rows: Sequence[Row]) -> Headline | None:
     theirs = [pair for pair in known if pair[0].key.subject.name not in (HEYOKA, MULTIWORD)]
     ours = [pair for pair in known if pair[0].key.subject.name == HEYOKA]
     other = HEYOKA if theirs else MULTIWORD
-    second = {_place(row): kept for row, kept in known if row.key.subject.name == other}
-    own = theirs or ours or known
-    chosen = [pair for pair in own if theirs and _place(pair[0]) in second] or own
+    others_kept = {_motion_key(row): kept for row, kept in known if row.key.subject.name == other}
+    candidates = theirs or ours or known
+    chosen = [pair for pair in candidates if theirs and _motion_key(pair[0]) in others_kept] or candidates
     if not chosen:
         return None
     last = max(abs(exact(row.horizon)) for row, _ in chosen)
@@ -311,23 +311,23 @@ def digits_headline(rows: Sequence[Row]) -> Headline | None:
     ]
     sentence += f", worst of {len(cases)})" if len(cases) > 1 and not lost else ")"
     sentence += f", none on {', '.join(lost[:_LOST])}" if lost else ""
-    sentence += f"; {other}: {digits_text(second[_place(row)])}." if _place(row) in second else "."
+    sentence += f"; {other}: {digits_text(others_kept[_motion_key(row)])}." if _motion_key(row) in others_kept else "."
     return Headline(sentence, shown=In.SHORT | In.FULL | In.PAGE)
 
 
 def _at_least(row: Row) -> float | None:
-    """Digits right that the absolute error of Ω and γ proves, for it is no smaller than the relative one."""
+    """A lower bound of the digits right from the absolute error of Ω and γ, which is at least the relative one."""
     errors = [row.metric(SOLUTION_ERROR, part, "max") for part in ("omega", "gamma")]
     sizes = [error.log10 for error in errors if error is not None and error.log10 is not None]
     return -max(sizes) if len(sizes) == len(errors) else None
 
 
-def _place(row: Row) -> tuple[str, int, str]:
+def _motion_key(row: Row) -> tuple[str, int, str]:
     return row.case, row.bits, row.horizon
 
 
 def named(rows: Sequence[Row]) -> Callable[[Row], str]:
-    """Name of a row among these: its case, and its integrator, where they have several and it is not heyoka."""
+    """A function for the name of a row: its case, and its integrator unless it is heyoka or that of all rows."""
     several = len({row.key.subject.name for row in rows}) > 1
     return lambda row: row.key.case + (f",{name}" if several and (name := computed_by(row)) else "")
 
@@ -335,8 +335,8 @@ def named(rows: Sequence[Row]) -> Callable[[Row], str]:
 def in_columns(
     title: str, cell: Callable[[Row], str], rows: Sequence[Row], shown: In = In.SHORT, notes: Sequence[str] = ()
 ) -> list[Table]:
-    """A line a motion, a column a format, or an integrator where all are in one format; of two rows in one place the
-    later.  No table without rows.
+    """A table with a line per motion and a column per format, or per integrator where all rows have one format; of two
+    rows for one cell the later.  No table without rows.
     """
     names, one_format = named(rows), len({row.precision for row in rows}) == 1
     lines: dict[str, dict[str, str]] = {}
@@ -357,7 +357,7 @@ def in_columns(
 
 
 def _in_lines(name: str, cells: list[str], room: int) -> list[list[str]]:
-    """The line of a motion; where case and integrator do not fit beside each other, one below the other."""
+    """The line of a motion; two lines where case and integrator do not fit on one."""
     case, comma, integrator = name.partition(", ")
     if len(name) <= room or not comma:
         return [[clip(name, room), *cells]]
@@ -365,25 +365,25 @@ def _in_lines(name: str, cells: list[str], room: int) -> list[list[str]]:
 
 
 def digits_columns(rows: Sequence[Row]) -> list[Table]:
-    """Digits right at every sample, each with its time; of two horizons the longer."""
+    """Digits right over all samples, each with its last time; of two horizons the longer."""
     known: dict[tuple[str, str, str], Row] = {}
     for row in rows:
         column = row.key.case, row.key.subject.name, row.precision
         if digits_kept(row) is not None and (column not in known or _end(row) >= _end(known[column])):
             known[column] = row
     columns = list(known.values())
-    more = "; of the attitude" if any(map(_attitude_asked, columns)) else ""
+    more = "; of the attitude" if any(map(_requests_attitude, columns)) else ""
     notes = [COMPUTED] if any(row.reference.how == "computed" for row in columns) else []
     return in_columns(f"Digits right, to |t|{more}", digits_until, columns, notes=notes)
 
 
 def attitude_columns(rows: Sequence[Row]) -> list[Table]:
-    """The largest errors of attitude and position, where a row was asked for them."""
+    """The largest errors of attitude and position, for rows that request them."""
     title = "Largest error of the attitude (rad), of the position"
-    return in_columns(title, _attitude_errors, list(filter(_attitude_asked, rows)), In.FULL | In.PAGE)
+    return in_columns(title, _attitude_errors, list(filter(_requests_attitude, rows)), In.FULL | In.PAGE)
 
 
-def _attitude_asked(row: Row) -> bool:
+def _requests_attitude(row: Row) -> bool:
     return row.metric(*_ATTITUDE) is not None or NOT_CARRIED.items() <= row.flags.items()
 
 
@@ -405,8 +405,8 @@ def _end(row: Row) -> float:
 
 
 def digits_until(row: Row) -> str:
-    """``9.2 to 1e5``; ``lost by 80`` where none is left; ``lost 400–600`` where all are lost between these samples; *
-    where no reference is proven.
+    """``9.2 to 1e5``; ``lost by 80`` where all are lost; ``lost 400–600`` where all are lost between these samples; *
+    where the reference is not proven.
     """
     kept, end = digits_kept(row), _end(row)
     assert kept is not None
@@ -423,32 +423,32 @@ def _unproven(row: Row) -> str:
 
 
 def _lost(row: Row) -> str:
-    """``lost 400–600``: of the samples that the row keeps the last with errors of Ω and γ below 1, and the first with
-    one of γ that is not; without such, the time from which all significant digits are lost.
+    """``lost 400–600``: of the samples in the row the last with errors of Ω and γ below 1, and the first with an error
+    of γ of at least 1; without the latter, the time from which all significant digits are lost.
     """
     omega, gamma = (row.series.get(f"{SOLUTION_ERROR}_{part}", Series([], [])) for part in ("omega", "gamma"))
-    end = next(iter(_large(gamma)), row.reference.until)
-    small = [time for time in takewhile(end.__ne__, gamma.times) if time not in _large(omega)]
+    end = next(iter(_times_of_large(gamma)), row.reference.until)
+    small = [time for time in takewhile(end.__ne__, gamma.times) if time not in _times_of_large(omega)]
     return f"lost {'–'.join(short(time.removeprefix('-')) for time in (*small[-1:], end))}"
 
 
-def _large(errors: Series) -> list[str]:
-    """The times at which a number is 1 or more, or NaN."""
+def _times_of_large(errors: Series) -> list[str]:
+    """The times at which an error is at least 1 or NaN."""
     sizes = ((time, value, logarithm(value)) for time, value in zip(errors.times, errors.values, strict=True))
     return [time for time, value, size in sizes if value == "nan" or (size is not None and size >= 0)]
 
 
 def _digits_of_attitude(row: Row) -> str:
-    """−log10 of the largest angle in radians, at most the digits of the format, where the row was asked for it."""
+    """−log10 of the largest angle in radians, at most the digits of the format, for rows that request the attitude."""
     error = row.metric(*_ATTITUDE)
     if error is None:
-        return f"; {NOT_CARRIED['attitude']}" if _attitude_asked(row) else ""
-    most = row.bits * math.log10(2)
-    return f"; {digits_text(most if error.log10 is None else min(most, max(0.0, -error.log10)))}"
+        return f"; {NOT_CARRIED['attitude']}" if _requests_attitude(row) else ""
+    digits = row.bits * math.log10(2)
+    return f"; {digits_text(digits if error.log10 is None else min(digits, max(0.0, -error.log10)))}"
 
 
 def motions(title: str, rows: Sequence[Row], notes: Sequence[str]) -> Table:
-    """Digits right, distance from the true motion and drift of every integral, a line a row."""
+    """Digits right, distance from the true motion and drift of every integral, one line per row."""
     columns = ["case", "format", "T", "steps", "outcome", "digits right", "error along", "across"]
     columns.append("drift of each integral")
     return Table(title, columns, [_motion(row) for row in rows], notes, left=True)
@@ -471,33 +471,33 @@ def _motion(row: Row) -> list[Cell]:
 
 
 def laws_headline(rows: Sequence[Row]) -> Headline | None:
-    """The laws that most of the healthy runs follow, of third-party integrators where there are any, and how many of
-    the planted faults have another law than these.
+    """The commonest laws of runs without planted faults, of third-party integrators if any, and the number of planted
+    faults with another law.
     """
     theirs = [row for row in rows if row.key.subject.name not in (HEYOKA, MULTIWORD)]
     healthy = theirs or [row for row in rows if not row.key.subject.variant] or rows
-    of_what = " with default options" if not theirs and len(healthy) < len(rows) else ""
-    parts = [_followed(healthy, drifts, of_what) for drifts in (False, True)]
+    condition = " with default options" if not theirs and len(healthy) < len(rows) else ""
+    parts = [_followed(healthy, drifts, condition) for drifts in (False, True)]
     sentence = ", ".join(part for part in parts if part)
     faults = [row for row in rows if row.key.subject.bias]
-    distinguished = sum(_told(row, healthy) for row in faults)
+    distinguished = sum(_shows_other_law(row, healthy) for row in faults)
     if faults and sentence:
         bias = " and ".join(dict.fromkeys(f"I1 off by {row.key.subject.bias}" for row in faults))
         sentence += f"; {distinguished} of {len(faults)} with {bias} show another law"
     return Headline(f"{sentence[0].upper()}{sentence[1:]}.") if sentence else None
 
 
-def _followed(rows: Sequence[Row], drifts: bool, of_what: str) -> str:
-    """``errors along the flow grow like t^1.5 (4 of 5 ensembles)``, and what a third of them or more do besides."""
+def _followed(rows: Sequence[Row], drifts: bool, condition: str) -> str:
+    """``errors along the flow grow like t^1.5 (4 of 5 ensembles)``, and a second law that at least a third follow."""
     laws = Counter(growth for row in rows for growth in {law.growth for law in _laws(row, drifts)})
-    of = sum(bool(_laws(row, drifts)) for row in rows)
+    total = sum(bool(_laws(row, drifts)) for row in rows)
     if not laws:
         return ""
-    most, *next_to_it = laws.most_common(2)
-    both = [most, *(pair for pair in next_to_it if 3 * pair[1] >= of > 1)]
+    most, *runner_up = laws.most_common(2)
+    shown = [most, *(pair for pair in runner_up if 3 * pair[1] >= total > 1)]
     # regular motions before those that amplify every error
-    (growth, count), *others = sorted(both, key=lambda pair: pair[0] == "exponential")
-    law = _HOW.get(growth, f"like {growth}") + (f" ({count} of {of} ensembles{of_what})" if of > 1 else "")
+    (growth, count), *others = sorted(shown, key=lambda pair: pair[0] == "exponential")
+    law = _HOW.get(growth, f"like {growth}") + (f" ({count} of {total} ensembles{condition})" if total > 1 else "")
     law += "".join(f" or {_HOW.get(other, f'like {other}')} ({times})" for other, times in others)
     name = rows[0].key.subject.name
     whose = "" if name in (HEYOKA, MULTIWORD) else f" of {clip(name, 40)}"
@@ -505,15 +505,15 @@ def _followed(rows: Sequence[Row], drifts: bool, of_what: str) -> str:
 
 
 def _laws(row: Row, drifts: bool) -> list[Law]:
-    """Laws of the error along the flow, or of the first integrals; what is exactly 0 has none."""
+    """Laws of the error along the flow, or of the first integrals; quantities that are exactly 0 have none."""
     laws = [(law, law.quantity) for law in row.laws.values() if law.exponent is not None or law.growth != "bounded"]
     if drifts:
         return [law for law, quantity in laws if quantity and quantity.name == DRIFT]
-    return [law for law, quantity in laws if quantity == _ALONG]
+    return [law for law, quantity in laws if quantity == _ERROR_ALONG]
 
 
-def _told(row: Row, healthy: Sequence[Row]) -> bool:
-    """Whether a law of the faulty ensemble is another than the healthy one of the same motion."""
+def _shows_other_law(row: Row, healthy: Sequence[Row]) -> bool:
+    """Whether a law of the faulty ensemble differs from that of the same motion without fault."""
     same = [peer for peer in healthy if (peer.case, peer.precision) == (row.case, row.precision)]
     expected = {law.growth for row in same for law in _laws(row, drifts=False)}
     return any(law.growth not in {*expected, "unresolved"} for law in _laws(row, drifts=False)) if expected else False

@@ -1,4 +1,4 @@
-"""The section of a page about computed motions over time: drift, distance from the truth, and their laws."""
+"""Sections of a page: errors over time with their growth laws, and digits right; pictures as files."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class _Column(NamedTuple):
     unit: str
 
     def of(self, row: Row) -> dict[Quantity, Series]:
-        """The series of a row that it may draw."""
+        """The series of a row that belong to this plot."""
         series_by_quantity = {series.quantity: series for series in row.series.values() if series.quantity}
         wanted = self.quantity
         return {
@@ -79,7 +79,7 @@ _COLUMNS = (
 
 
 class _Chart(NamedTuple):
-    """Axes of one case and quantity, with what they show in words, and where each law stands.
+    """Axes of one case and quantity, their alternative text, and the labels of the laws.
 
     integrals: the first integrals whose drift is drawn.
     """
@@ -92,7 +92,7 @@ class _Chart(NamedTuple):
 
     @property
     def title(self) -> str:
-        """The case and the quantity, of drifts with the first integrals by name."""
+        """The case and the quantity, for drifts with the names of the first integrals."""
         return f"{self.label} {' or '.join(map(integral_text, self.integrals))}".rstrip()
 
 
@@ -133,7 +133,7 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
             chart.axes.set_ylim(min(low for low, _ in y), max(high for _, high in y))
             words, number = spoken(chart.alternative, 24), f"growth-{len(section.pictures)}"
             section.pictures.append(finish(chart.axes, chart.title, words, number, ends=chart.ends))
-    section.notes += _thinned(row for case in names[:MOST_PLOTS] for _, row in cases[case])
+    section.notes += _note_on_samples(row for case in names[:MOST_PLOTS] for _, row in cases[case])
     if _FITTED.label in section.legend:
         section.legend[_FITTED.label] = section.legend.pop(_FITTED.label)
         section.notes.append(
@@ -165,9 +165,9 @@ def _chart(section: Section, case: str, column: _Column, members: Sequence[tuple
     return chart
 
 
-def _curve(section: Section, chart: _Chart, case: str, key: Key, row: Row, quantity: Quantity, held: Series) -> None:
-    """Draw one run with its noise and its law, and list it."""
-    x, y = points(held, (1 - row.bits) * math.log10(2))
+def _curve(section: Section, chart: _Chart, case: str, key: Key, row: Row, quantity: Quantity, series: Series) -> None:
+    """Draws one run with its noise and its law, and adds it to the table."""
+    x, y = points(series, (1 - row.bits) * math.log10(2))
     if not x:
         chart.alternative.append(f"{key.label}: nothing that the reference resolves, or exactly 0.")
         return
@@ -182,19 +182,19 @@ def _curve(section: Section, chart: _Chart, case: str, key: Key, row: Row, quant
     if law:
         if _law(chart.axes, colour, law, x, y):
             section.key(_FITTED)
-        chart.alternative.append(_law_said(key.label, law))
+        chart.alternative.append(_law_sentence(key.label, law))
         chart.ends.append(End(_law_short(law), colour, x[-1], y[-1]))
     what = quantity.component.replace("_", " ")
     chart.alternative.append(f"{key.label}: {scientific(y[-1])} ε ({what}) at |t| = {scientific(x[-1])}.")
     named = f"{'drift of' if quantity.name == DRIFT else 'error'} {what}"
     most = row.metrics.get(quantity.over("max").text)
-    last = [short(held.times[-1]), short(held.values[-1])]
+    last = [short(series.times[-1]), short(series.values[-1])]
     section.rows.append([case, key.label, named, short(most.value) if most else "", *last, *_law_words(law)])
 
 
-def _thinned(rows: Iterable[Row]) -> list[str]:
-    """A sentence where curves have fewer samples than their runs; none where they have all."""
-    counts = {(max(len(held.times) for held in row.series.values()), row.samples) for row in rows if row.series}
+def _note_on_samples(rows: Iterable[Row]) -> list[str]:
+    """A sentence where curves have fewer samples than their runs; none where they have all of them."""
+    counts = {(max(len(series.times) for series in row.series.values()), row.samples) for row in rows if row.series}
     fewer = [pair for pair in counts if pair[0] < pair[1]]
     if not fewer:
         return []
@@ -204,16 +204,16 @@ def _thinned(rows: Iterable[Row]) -> list[str]:
 
 
 def _span(counts: Sequence[int]) -> str:
-    """``13``, or ``13 to 20`` of different counts."""
+    """``13``, or ``13 to 20`` for different counts."""
     return str(counts[0]) if counts[0] == counts[-1] else f"{counts[0]} to {counts[-1]}"
 
 
 def _largest(column: _Column, rows: Sequence[Row]) -> Quantity | None:
-    """The quantity that is largest over all samples, of those with a series in one of the rows."""
+    """The quantity with the largest value over all samples, among those with a series in one of the rows."""
 
     def largest(pair: tuple[Row, Quantity]) -> float:
-        most = pair[0].metrics.get(pair[1].over("max").text)
-        return -math.inf if most is None or most.log10 is None else most.log10
+        metric = pair[0].metrics.get(pair[1].over("max").text)
+        return -math.inf if metric is None or metric.log10 is None else metric.log10
 
     drawn = ((row, quantity) for row in rows for quantity, series in column.of(row).items() if series.values)
     return max(drawn, key=largest, default=(None, None))[1]
@@ -225,7 +225,7 @@ def _band(metrics: dict[str, Metric], quantity: Quantity) -> float | None:
 
 
 def _law(axes: Any, colour: str, law: Law, x: Sequence[float], y: Sequence[float]) -> bool:
-    """Draw the law through the mean of its samples, and the fan of its interval; False where absent."""
+    """Draws the law through the mean of its samples, and the range of its interval; False without a law."""
     if law.exponent is None or law.growth == "unresolved":
         return False
     ends = [logarithm(end) for end in (law.first, law.last)]
@@ -242,7 +242,7 @@ def _law(axes: Any, colour: str, law: Law, x: Sequence[float], y: Sequence[float
 
 
 def through(law: Law, slope: float, fitted: Sequence[tuple[float, float]], grid: Sequence[float]) -> list[float]:
-    """The heights over ``grid`` of a law with that slope through the middle of the points ``fitted``; all log10.
+    """The heights over ``grid`` of a law with that slope through the mean of the points ``fitted``; all log10.
 
     slope: exponent of a power, rate of an exponential, whose logarithm is not a line over log10 |t|.
     """
@@ -252,7 +252,7 @@ def through(law: Law, slope: float, fitted: Sequence[tuple[float, float]], grid:
 
 
 def _law_short(law: Law) -> str:
-    """Few enough letters to stand beside a curve."""
+    """The law in few enough characters for a label beside a curve."""
     if law.exponent is None or law.growth == "unresolved":
         return law.growth if law.exponent is None else "unresolved"
     if law.growth == "bounded":
@@ -260,7 +260,7 @@ def _law_short(law: Law) -> str:
     return f"e^({law.exponent:.2g} t)" if law.growth == "exponential" else f"{law.growth} ({law.exponent:z.2f})"
 
 
-def _law_said(label: str, law: Law) -> str:
+def _law_sentence(label: str, law: Law) -> str:
     growth, exponent, _ = _law_words(law)
     if not exponent:
         return f"{label}: law {growth}."
@@ -275,18 +275,18 @@ def _law_words(law: Law | None) -> list[str]:
     return [law.growth, exponent, short(law.lost_at) if law.lost_at else ""]
 
 
-# The section of a page that says how many digits are right: a chart a format.
+# The section of a page about digits right: one chart per format.
 
 
 MOST_LANES, MOST_LISTED = 40, 160
 _Run = tuple[str, Row]
-"""With the source of its report."""
+"""A row, with the source of its report."""
 
 
 def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
-    """Digits right at every sample: a chart a format, a line a motion and integrator; those of ``first`` on top.
+    """Digits right over all samples: a chart per format, a line per motion and integrator; those of ``first`` on top.
 
-    Runs with other options than the usual, planted faults among them, are in the numbers alone.
+    Runs with other than default options, such as planted faults, are only in the table.
     """
     runs = [(source, row) for source, report in sources for row in report.rows if RELATIVE.text in row.metrics]
     if not runs:
@@ -310,8 +310,8 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     wanted = set(first)
     lanes: dict[str, list[_Run]] = {}
     for source, row in sorted(runs, key=lambda run: (bool(run[1].key.subject.variant), run[1].case not in wanted)):
-        how = variant(row, sources)
-        lanes.setdefault(clip(row.case, 30) + (f" ({clip(how, 30)})" if how else ""), []).append((source, row))
+        options = variant(row, sources)
+        lanes.setdefault(clip(row.case, 30) + (f" ({clip(options, 30)})" if options else ""), []).append((source, row))
     usual = [name for name, members in lanes.items() if not members[0][1].key.subject.variant] or list(lanes)
     for name in usual[:MOST_LANES]:
         lanes[name].sort(key=lambda run: logarithm(run[1].horizon) or 0.0)
@@ -322,17 +322,17 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         section.pictures.append(_digits_right(section, clip(precision, 20), drawn, f"digits-{number}"))
     listed: list[Sequence[Cell]] = [_cells(name, *run) for name, members in lanes.items() for run in members]
     section.rows = listed[:MOST_LISTED]
-    if (more := len(lanes) - len(usual[:MOST_LANES])) > 0:
-        section.notes.append(f"{plural(more, 'more run')} in the numbers alone.")
+    if (hidden := len(lanes) - len(usual[:MOST_LANES])) > 0:
+        section.notes.append(f"{plural(hidden, 'more run')} in the numbers alone.")
     left_out(section, len(listed) - MOST_LISTED, "run")
     return section
 
 
 def _digits_right(section: Section, precision: str, lanes: dict[str, list[_Run]], name: str) -> Picture:
-    """The chart of one format; the run of the longest horizon is named, the candidate's of two reports."""
-    most = max(row.bits for members in lanes.values() for _, row in members) * math.log10(2)
+    """The chart of one format; the run with the longest horizon is labelled, of two reports the candidate's."""
+    digits = max(row.bits for members in lanes.values() for _, row in members) * math.log10(2)
     texts = {lane: f"{lane}: {_right(members[-1][1], digits_until)}" for lane, members in lanes.items()}
-    axes = new_axes(f"digits right, of {most:.0f}", "", 0.75 + 0.19 * max(3, len(lanes)), room(texts.values()))
+    axes = new_axes(f"digits right, of {digits:.0f}", "", 0.75 + 0.19 * max(3, len(lanes)), room(texts.values()))
     ends = []
     for index, (lane, members) in enumerate(lanes.items()):
         for source, row in members:
@@ -345,36 +345,36 @@ def _digits_right(section: Section, precision: str, lanes: dict[str, list[_Run]]
                 ends_of_bar = [(kept or 0.0) - band, (kept or 0.0) + band]
                 axes.plot(ends_of_bar, [-index] * 2, color=COLOURS[0], lw=3, alpha=0.3)
         ends.append(End(texts[lane], COLOURS[0], kept or 0.0, -index))
-    axes.set(xlim=(-0.02 * most, 1.02 * most), ylim=(0.7 - len(lanes), 0.7), yticks=[])
-    axes.axvline(most, color=COLOURS[_GREY], lw=0.9, ls=DASHED)
-    words = spoken([f"{text}." for text in texts.values()], 24)
-    return finish(axes, f"Digits right in {precision}", words, name, ends=ends)
+    axes.set(xlim=(-0.02 * digits, 1.02 * digits), ylim=(0.7 - len(lanes), 0.7), yticks=[])
+    axes.axvline(digits, color=COLOURS[_GREY], lw=0.9, ls=DASHED)
+    description = spoken([f"{text}." for text in texts.values()], 24)
+    return finish(axes, f"Digits right in {precision}", description, name, ends=ends)
 
 
 def _kept(row: Row) -> float | None:
-    """Digits right; None for a run that failed, and where nothing says."""
+    """Digits right; None for a failed run, and where they are unknown."""
     return digits_kept(row) if row.outcome == "success" else None
 
 
 def _right(row: Row, text: Callable[[Row], str]) -> str:
-    """Digits right in words, or why there are none."""
+    """The text of the digits right, or the reason why there are none."""
     if _kept(row) is not None:
         return text(row)
     return row.outcome if row.outcome != "success" else row.metrics[RELATIVE.text].value
 
 
 def _cells(lane: str, source: str, row: Row) -> list[str]:
-    """One run in the numbers."""
+    """The line of one run in the table."""
     band, right = row.metrics[RELATIVE.text].band, _right(row, lambda row: digits_text(digits_kept(row) or 0.0))
     name, full = with_source(clip(row.precision, 20), source), f"{row.bits * math.log10(2):.1f}"
     return [lane, name, short(row.horizon), str(row.samples or ""), right, full, f"{band:.2f}" if band else ""]
 
 
-# Every picture of a report as a file of its own, as SVG and as PDF: the title above it, the legend below it.
+# Every picture of a report as a file, in SVG and in PDF, with the title above and the legend below.
 
 
 def draw_report(report: Report, directory: Path, kinds: Kinds) -> list[Path]:
-    """The files written into ``directory``, two a picture of the page; raises InputError where it has none."""
+    """Writes two files per picture of the page into ``directory``; raises InputError without pictures."""
     pictures = [(section, picture) for section in sections([("", report)], kinds) for picture in section.pictures]
     if not pictures:
         raise InputError("The report has no row that is drawn.", "`heavytop run --plan smoke` makes some.")
@@ -386,8 +386,8 @@ def _save(section: Section, picture: Picture, stem: Path) -> list[Path]:
     axes = picture.axes
     with quiet_style():
         axes.set_title(fill(picture.title, 60), loc="left", pad=10, size=10)
-        drawn = axes.get_legend_handles_labels()[1]
-        _legend(picture, [key for key in section.legend.values() if key.label in drawn])
+        labels = axes.get_legend_handles_labels()[1]
+        _legend(picture, [key for key in section.legend.values() if key.label in labels])
         svg, pdf = stem.with_suffix(".svg"), stem.with_suffix(".pdf")
         svg.write_text(document(axes.figure, bbox_inches="tight"), "utf-8")
         axes.figure.savefig(pdf, metadata={"CreationDate": None, "Creator": "heavytop"}, bbox_inches="tight")

@@ -1,4 +1,4 @@
-"""A report on a terminal: in full, and in the at most 25 lines of 80 columns that end a run."""
+"""A report on a terminal: in full, and as the summary at the end of a run, at most 25 lines of 80 columns."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from heavytop.report.render.text import WORD_STYLES, Lines, Tally, failed, failu
 
 WIDTH = 80
 LINES = 21
-"""The command says in four more where the report is and what shows the rest."""
+"""The command prints four more: where the report is, and the commands that show all."""
 MOST_ROWS = 1000
-"""More rows than these are counted, not listed."""
+"""Most rows listed; more are only counted."""
 _MOST_FAILURES = 3
 _MOST_OF_ONE = 4
-"""Lines of a failure."""
+"""Most lines of one failure."""
 _FEWEST = 2
 
 
@@ -36,7 +36,7 @@ _STYLES = {"soft": "dim", "big": "bold"}
 
 
 def summary(report: Report, kinds: Kinds) -> RenderableType:
-    """Summary of the rows of every kind, then those that failed."""
+    """The summary of the rows of every kind, then the failed rows."""
     blocks_by_kind = document(report, kinds, In.FULL)
     parts: list[RenderableType] = [head(report, len(report.rows))]
     parts += [_Sentence(headline.text, headline.word) for headline in headlines(blocks_by_kind, kinds)]
@@ -56,7 +56,7 @@ def summary(report: Report, kinds: Kinds) -> RenderableType:
 
 
 class _Sentence:
-    """A sentence as wide as where it is printed, its verdict in colour; all lines but the first are indented more."""
+    """A sentence wrapped to the console, its verdict in colour; all lines but the first are indented more."""
 
     def __init__(self, text: str, word: Word | None = None, style: str = "", indent: str = "") -> None:
         self._text, self._word, self._style, self._indent = text, word, style, indent
@@ -74,7 +74,7 @@ class _Sentence:
 
 
 def _shown(blocks: Iterable[Block], brief: bool = False) -> Iterator[RenderableType]:
-    """The blocks of one kind; in a brief summary the title of a table stands above its first column."""
+    """The blocks of one kind; in a brief summary the title of a table heads its first column."""
     indent = "" if brief else "  "
     for number, block in enumerate(blocks):
         if isinstance(block, Table | Card) and number and not brief:
@@ -95,7 +95,7 @@ def _shown(blocks: Iterable[Block], brief: bool = False) -> Iterator[RenderableT
 
 
 def _lines(parts: Iterable[RenderableType]) -> list[str]:
-    """Text that a terminal of 80 columns shows, without colours."""
+    """The lines on a terminal of 80 columns, without colours."""
     console = Console(width=WIDTH, file=StringIO(), color_system=None, force_terminal=False, legacy_windows=False)
     console.print(Group(*parts), highlight=False, markup=False)
     assert isinstance(console.file, StringIO)
@@ -103,14 +103,14 @@ def _lines(parts: Iterable[RenderableType]) -> list[str]:
 
 
 def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
-    """The lines for ``rows``, which may be a stream of any length: none is held but the first 1,000."""
+    """The summary of ``rows``, a stream of any length of which at most the first 1,000 are held."""
     stream = iter(rows)
     first = list(islice(stream, MOST_ROWS + 1))
     failures: list[str] = []
     answers: list[Block] = []
     number = bad = aborted = 0
 
-    def seen(rows: Iterable[Row]) -> Iterable[Row]:
+    def counted(rows: Iterable[Row]) -> Iterable[Row]:
         nonlocal number, bad, aborted
         for row in rows:
             number += 1
@@ -123,28 +123,28 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
             yield row
 
     if len(first) <= MOST_ROWS:
-        held = list(seen(first))
+        held = list(counted(first))
         blocks = document(replace(report, rows=held), kinds, In.SHORT)
         answers += headlines(blocks, kinds)
         others = ([block for block in blocks if block not in answers] for blocks in blocks.values())
         parts = [_lines(_shown(blocks, brief=True)) for blocks in (answers, *others)]
         parts += [wrapped(sentence)[:_MOST_OF_ONE] for sentence in [unsupported(held)] if sentence]
     else:
-        parts = [_counted(seen(chain(first, stream)))]
+        parts = [_counted(counted(chain(first, stream)))]
     head = f"Plan {report.plan.get('name', '?')}: {plural(number, 'measurement')}, "
     head += f"{bad} failed:" if bad else f"{aborted} aborted." if aborted else "all finished."
     if bad > len(failures):
         failures[-1:] = [f"and {bad - len(failures) + 1} more"]
     lines = [head, *(line for failure in failures for line in wrapped(f"  {failure}", "    ")[:_MOST_OF_ONE])]
-    if answers and not bad:  # what was measured and how good it is comes first, unless something failed
+    if answers and not bad:  # the results come first, unless something failed
         parts.insert(1, [lines.pop()])
     shown = map(printable, [*lines, *fitted(parts, LINES - len(lines))])
     return "\n".join(line if len(line) <= WIDTH else f"{line[: WIDTH - 1]}…" for line in shown)
 
 
 def fitted(parts: Sequence[Sequence[str]], most: int) -> list[str]:
-    """The lines of all parts; where they are more than ``most``, the longest parts are cut in the middle, which say by
-    how much: the last line of a table is its finest setting.
+    """The lines of all parts; where there are more than ``most``, the longest parts lose lines in the middle, which
+    they count: the last line of a table is its finest setting.
     """
     sizes = [len(part) for part in parts]
     while sum(sizes) > most and max(sizes) > _FEWEST:
@@ -156,7 +156,7 @@ def fitted(parts: Sequence[Sequence[str]], most: int) -> list[str]:
 
 
 def _without_middle(part: Sequence[str], size: int) -> list[str]:
-    """``size`` lines of a longer part, at least two: its first ones, how many are left out, and its last one."""
+    """``size`` lines of a longer part, at least two: its first ones, the number left out, and its last one."""
     last = size > _FEWEST
     left_out = len(part) - size + 1
     lines = f"  and {left_out} {'line' if left_out == 1 else 'lines'} more"
@@ -164,7 +164,7 @@ def _without_middle(part: Sequence[str], size: int) -> list[str]:
 
 
 def _counted(rows: Iterable[Row]) -> list[str]:
-    """How rows of each kind and format ended, and the fewest digits."""
+    """The outcomes of the rows of each kind and format, and the fewest digits."""
     tally = Tally()
     for row in rows:
         tally.take(row)
@@ -178,10 +178,10 @@ def _counted(rows: Iterable[Row]) -> list[str]:
     return lines
 
 
-# The laws by which drift and error grow, in the few lines at the end of a run.
+# Growth laws of drift and error, for the summary at the end of a run.
 
 
-_OWN = (HEYOKA, MULTIWORD)
+_BUILT_IN = (HEYOKA, MULTIWORD)
 _MEANS = {
     "t^0.5": "less than rounding noise that adds up",
     "t": "a frequency that is off by a constant, by truncation or a wrong coefficient",
@@ -191,62 +191,62 @@ _MEANS = {
 }
 """Laws of the error along the flow."""
 _WIDTHS = {"integrals": 16, "along": 12, "across": 12}
-"""Subject of a summary, and the characters there are for it."""
+"""Columns of the summary, and their widths in characters."""
 _COLUMNS = "", "integrals", "error along", "across"
-_FAR = 2.0
+_FAR_LARGER = 2.0
 """Decades."""
 
 
 def laws_in_short(rows: Sequence[Row]) -> list[Block]:
-    """The laws, those of all first integrals as one; formats and motions with the same laws together.  Then what those
-    of third-party integrators mean.
+    """The laws, with all first integrals in one column; formats and motions with equal laws share a line.  Then the
+    meaning of those of third-party integrators.
 
-    Those of a variant, such as a planted fault, stand together for all motions.
+    The laws of a variant, such as a planted fault, are united for all motions.
     """
     united: dict[tuple[str, ...], list[Row]] = {}
     for row in rows:
-        united.setdefault(_united(row), []).append(row)
+        united.setdefault(_law_group(row), []).append(row)
     formats: dict[tuple[str, str, str, tuple[str, ...]], list[str]] = {}
     for row in rows:
         name = "" if row.key.subject.name == HEYOKA else row.key.subject.name
-        what = (name, row.key.subject.variant, row.key.case, _growths(united[_united(row)]))
-        formats.setdefault(what, []).append(row.precision)
+        key = (name, row.key.subject.variant, row.key.case, _growths(united[_law_group(row)]))
+        formats.setdefault(key, []).append(row.precision)
     cases: dict[tuple[str, ...], list[str]] = {}
     for (name, variant, case, growths), precisions in formats.items():
         runs = " ".join(part for part in (name, ", ".join(precisions), variant) if part)
         cases.setdefault((runs, *growths), []).append(case)
     cells = [[f"{runs}: {', '.join(motions)}", *meanings] for (runs, *meanings), motions in cases.items()]
     blocks: list[Block] = [Table("Grows like", _COLUMNS, cells, words=len(_COLUMNS), shown=In.SHORT)]
-    others = [row for row in rows if row.key.subject.name not in _OWN]
+    others = [row for row in rows if row.key.subject.name not in _BUILT_IN]
     ours = {(row.key.case, row.precision): row for row in rows if row.key.subject.name == HEYOKA}
     meanings = (_meaning(row) + _larger(row, ours.get((row.key.case, row.precision), row)) for row in others)
     return [*blocks, *(Note(sentence, shown=In.SHORT) for sentence in meanings)]
 
 
-def _united(row: Row) -> tuple[str, ...]:
-    """Equal for the rows whose laws are said as one: those of a variant, else a row alone."""
+def _law_group(row: Row) -> tuple[str, ...]:
+    """The group of rows whose laws are united: all of a variant, else one row."""
     subject = row.key.subject
     return subject.name, subject.variant, row.precision, "" if subject.variant else row.key.case
 
 
 def _growths(rows: Sequence[Row]) -> tuple[str, ...]:
-    """The classes of the laws of the first integrals, along and across the flow; of what is exactly 0 none."""
+    """The classes of the laws of the first integrals, along and across the flow; what is exactly 0 has none."""
     laws: dict[str, dict[str, None]] = {}
     for law in (law for row in rows for law in row.laws.values()):
         quantity = law.quantity or Quantity("")
-        what = "integrals" if quantity.name == DRIFT else quantity.component
-        if what in _WIDTHS and (law.growth, law.exponent) != ("bounded", None):
-            laws.setdefault(what, {})[law.growth] = None
-    return tuple(_either(laws.get(what, {}), width) for what, width in _WIDTHS.items())
+        column = "integrals" if quantity.name == DRIFT else quantity.component
+        if column in _WIDTHS and (law.growth, law.exponent) != ("bounded", None):
+            laws.setdefault(column, {})[law.growth] = None
+    return tuple(_law_names(laws.get(column, {}), width) for column, width in _WIDTHS.items())
 
 
 def _meaning(row: Row) -> str:
-    """Meaning of the law of a third-party integrator."""
+    """The meaning of the law of a third-party integrator."""
     name = Quantity(SOLUTION_ERROR, "along").text
     law = row.laws.get(name)
     growth = "unresolved" if law is None else law.growth
     grows = {
-        "unresolved": f"follows no single law{_lately(row.series.get(name))}",
+        "unresolved": f"follows no single law{_recent_power(row.series.get(name))}",
         "bounded": "is bounded",
         "exponential": "grows exponentially",
     }.get(growth, f"grows like {growth}")
@@ -255,24 +255,24 @@ def _meaning(row: Row) -> str:
 
 
 def _larger(row: Row, ours: Row) -> str:
-    """A remark that no law makes: an error that is far larger than heyoka's of the same motion; "" where it is not."""
-    error, known = (row.metric(SOLUTION_ERROR, "along", "final") for row in (row, ours))
-    if error is None or known is None or size(error) - size(known) < _FAR:
+    """A remark on an error far larger than heyoka's on the same motion; "" where it is not."""
+    error, heyoka_error = (row.metric(SOLUTION_ERROR, "along", "final") for row in (row, ours))
+    if error is None or heyoka_error is None or size(error) - size(heyoka_error) < _FAR_LARGER:
         return ""
-    return f" At the end it is {short(error.value)}, heyoka's {short(known.value)}."
+    return f" At the end it is {short(error.value)}, heyoka's {short(heyoka_error.value)}."
 
 
-def _lately(series: Series | None) -> str:
-    """By which power an error grew over the last decade of t; "" where that is not known."""
-    known = {} if series is None else dict(zip(*points(series), strict=True))
-    if not known or max(known) - min(known) < 1:
+def _recent_power(series: Series | None) -> str:
+    """The power by which an error grew over the last decade of t; "" where it is unknown."""
+    curve = {} if series is None else dict(zip(*points(series), strict=True))
+    if not curve or max(curve) - min(curve) < 1:
         return ""
-    end = max(known)
-    begin = min(known, key=lambda time: abs(end - 1 - time))
-    return f", over the last decade of t like t^{(known[end] - known[begin]) / (end - begin):z.1f}"
+    end = max(curve)
+    begin = min(curve, key=lambda time: abs(end - 1 - time))
+    return f", over the last decade of t like t^{(curve[end] - curve[begin]) / (end - begin):z.1f}"
 
 
-def _either(growths: Iterable[str], width: int) -> str:
-    """The laws of several quantities: by name where there is room."""
+def _law_names(growths: Iterable[str], width: int) -> str:
+    """The laws of several quantities: their names where these fit, else their number."""
     words = list(growths)
     return " or ".join(words) or "-" if len(" or ".join(words)) <= width else f"{len(words)} laws"

@@ -1,4 +1,4 @@
-"""Words and tables of a report for a terminal: what rich can print."""
+"""Sentences and tables of a report for a terminal, printed by rich."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def largest_over(rows: Iterable[Row]) -> str:
-    """``largest over N samples``, with the least and the most where rows have different numbers of them."""
+    """``largest over N samples``; a range where the numbers of samples differ."""
     counts = sorted({row.samples for row in rows if row.samples})
     if not counts:
         return "largest over the samples"
@@ -40,9 +40,9 @@ COMPUTED = "lost a–b: all digits, between t = a and b; this and *: reference c
 
 
 def failed(row: Row, kinds: Kinds) -> bool:
-    """Whether a measurement did not succeed; that a run aborts may be what its rows are there to show.
+    """Whether a measurement failed; for some kinds an aborted run is a result.
 
-    What an integrator declares that it cannot do is not a failure.
+    A request that the integrator declares unsupported is not a failure.
     """
     if row.outcome == UNSUPPORTED:
         return False
@@ -51,13 +51,13 @@ def failed(row: Row, kinds: Kinds) -> bool:
 
 def unsupported(rows: Iterable[Row]) -> str:
     """Requests that integrators declare unsupported, in one line; empty without such a row."""
-    lacking = [row for row in rows if row.outcome == UNSUPPORTED]
-    why = dict.fromkeys((row.reference.reason or "").removesuffix(".") for row in lacking)
-    return f"Not supported, and not measured: {plural(len(lacking), 'row')}; {'; '.join(why)}." if lacking else ""
+    matching = [row for row in rows if row.outcome == UNSUPPORTED]
+    reasons = dict.fromkeys((row.reference.reason or "").removesuffix(".") for row in matching)
+    return f"Not supported, and not measured: {plural(len(matching), 'row')}; {'; '.join(reasons)}." if matching else ""
 
 
 def failure(row: Row) -> str:
-    """How a measurement that did not succeed ended, and why."""
+    """How a failed measurement ended, and why."""
     if row.outcome in (FAILED, OUT_OF_TIME, NOT_ASKED):
         return f"  {row.key.kind}: {row.reference.reason} in {row.precision}"
     if row.outcome in UNMEASURED:
@@ -66,7 +66,7 @@ def failure(row: Row) -> str:
 
 
 def head(report: AnyReport, rows: int) -> Text:
-    """The plan, how many measurements, and with which versions."""
+    """The plan, the number of measurements, and the versions of packages."""
     packages = report.environment.get("packages", {})
     versions = ", ".join(f"{n} {packages[n]}" for n in ("heavytop", "heyoka", "numpy", "python-flint") if n in packages)
     return Text(printable(f"Plan {report.plan.get('name', '?')}: {plural(rows, 'measurement')} ({versions})"))
@@ -83,12 +83,12 @@ def title(text: str) -> Text:
 
 @dataclass(slots=True)
 class Lines:
-    """A table without lines, as wide as where it is printed; where its words do not fit beside each other, a block for
-    each row, below the name of the first column: its first cell, and then every other one behind the name of its
-    column.  No word is broken.
+    """A table without rules, as wide as the console; where its words do not fit side by side, a block for each row
+    below the name of the first column: the first cell, and then every other one after the name of its column.  No word
+    is broken.
 
-    words: how many first columns are words; the others are numbers.  left: the last column is words too.
-    head: stands above the first column.
+    words: the number of leading columns of text; the others are numbers.  left: the last column is text too.
+    head: the heading of the first column.
     """
 
     columns: Sequence[str]
@@ -104,7 +104,7 @@ class Lines:
         rows = [[_styled(cell) for cell in row] for row in self.rows]
         cells = [columns, *([cell.plain for cell in row] for row in rows)]
         indices = range(len(columns))
-        widths = [max(cell_len(word) for row in cells for word in _glued(row[i]).split(" ")) for i in indices]
+        widths = [max(cell_len(word) for row in cells for word in _nobreak(row[i]).split(" ")) for i in indices]
         wides = [max(cell_len(row[index]) for row in cells) for index in indices]
         edge = not self.head
         room = options.max_width - sum(wide + 2 for wide in wides[1:]) - 2 * edge
@@ -114,30 +114,29 @@ class Lines:
             return
         if widths[0] + 2 <= room < wides[0]:
             wides[0] = room
-        while (
-            sum(wides) + 2 * (len(wides) - 1 + edge) > options.max_width
-        ):  # the widest is made narrower, no cell than its words
+        # the widest column is narrowed, down to its longest word
+        while sum(wides) + 2 * (len(wides) - 1 + edge) > options.max_width:
             wides[max(range(len(wides)), key=lambda index: (wides[index] > widths[index], wides[index]))] -= 1
-        made = Table(box=None, pad_edge=edge, header_style="dim")
+        table = Table(box=None, pad_edge=edge, header_style="dim")
         for index, (column, wide) in enumerate(zip(columns, wides, strict=True)):
             words = index < self.words or (self.left and index == len(columns) - 1)
-            made.add_column(Text(column), justify="left" if words else "right", width=wide)
-        indent = "  " if widths[0] + 2 <= wides[0] else ""  # of what is broken
+            table.add_column(Text(column), justify="left" if words else "right", width=wide)
+        indent = "  " if widths[0] + 2 <= wides[0] else ""  # of continued lines
         for row in rows:
-            made.add_row(_broken(row[0], wides[0], indent), *map(_broken, row[1:], wides[1:]))
-        yield made
+            table.add_row(_wrapped_cell(row[0], wides[0], indent), *map(_wrapped_cell, row[1:], wides[1:]))
+        yield table
 
 
-def _glued(text: str) -> str:
-    """The text with other spaces where no line is broken: beside ±, and inside parts that two spaces separate."""
+def _nobreak(text: str) -> str:
+    """The text with no-break spaces beside ±, and inside parts separated by two spaces."""
     return re.sub(r"(?<! ) (?! )" if "  " in text else r" (?=±)|(?<=±) ", "\u00a0", text)
 
 
-def _broken(cell: Text, width: int, indent: str = "") -> Text:
-    """The cell in lines of at most that width."""
+def _wrapped_cell(cell: Text, width: int, indent: str = "") -> Text:
+    """The cell wrapped into lines of at most that width."""
     if cell_len(cell.plain) <= width:
         return cell
-    return Text("\n".join(wrapped(_glued(cell.plain), indent, "", width)).replace("\u00a0", " "), style=cell.style)
+    return Text("\n".join(wrapped(_nobreak(cell.plain), indent, "", width)).replace("\u00a0", " "), style=cell.style)
 
 
 def _styled(cell: Cell | Text) -> Text:
@@ -148,17 +147,17 @@ def _styled(cell: Cell | Text) -> Text:
 
 
 def _blocks(columns: Sequence[str], rows: Iterable[Sequence[Text]], width: int) -> Iterator[Text]:
-    for first, *rest in rows:
+    for first, *others in rows:
         yield first
-        pairs = zip(columns[1:], rest, strict=True)
+        pairs = zip(columns[1:], others, strict=True)
         named_cells = ";  ".join(
-            f"{column} {_glued(cell.plain)}".strip() for column, cell in pairs if cell.plain.strip()
+            f"{column} {_nobreak(cell.plain)}".strip() for column, cell in pairs if cell.plain.strip()
         )
         yield from (Text(line.replace("\u00a0", " ")) for line in wrapped(named_cells, "    ", "    ", width - 4))
 
 
 def wrapped(text: str, indent: str = "  ", first: str = "", width: int = 80) -> list[str]:
-    """A sentence in lines of so many columns, all but the first indented; no word is broken."""
+    """A sentence in lines of at most ``width`` columns, all but the first indented; no word is broken."""
     return wrap(text, width, initial_indent=first, subsequent_indent=indent, **_WHOLE_WORDS)
 
 
@@ -166,7 +165,7 @@ _WHOLE_WORDS: Any = {"break_long_words": False, "break_on_hyphens": False}
 
 
 def both(lines: Iterable[tuple[Row, Sequence[Cell]]]) -> list[list[Cell]]:
-    """The cells of each row behind its case; what is the same forward and backward once, and then without direction."""
+    """The cells of each row after its case; equal lines forward and backward are one, without direction."""
     groups: dict[tuple[str, ...], tuple[list[Row], Sequence[Cell]]] = {}
     for row, cells in lines:
         same = row.key.case, computed_by(row), *map(cell_text, cells)
@@ -183,11 +182,11 @@ def drifts(row: Row) -> list[tuple[str, Metric]]:
     return [(q.component, metric) for q, metric in quantities if (q.name, q.statistic) == (DRIFT, "max")]
 
 
-# The summary of a report with more rows than anybody reads.
+# The summary of a report with very many rows.
 
 
 class Tally:
-    """How rows ended, and the fewest digits right with their case, by measure and format."""
+    """Counts of outcomes, and the fewest digits right with their case, by measure and format."""
 
     def __init__(self) -> None:
         self.ended: dict[tuple[str, str], Counter[str]] = {}
@@ -208,12 +207,12 @@ class Tally:
 
 
 MOST_LISTED = 5000
-"""More rows than these nobody reads: `show` sums them up too."""
+"""Most rows that `show` lists; more are summarized."""
 
 
 def worst(report: AnyReport, rows: Iterable[Row], hint: str) -> RenderableType:
-    """The largest error of each metric with its rounding noise, the fewest digits right, and how many rows ended how,
-    by measure and format; then the hint.
+    """The largest error of each metric with its rounding noise, the fewest digits right, and the number of rows with
+    each outcome, by measure and format; then the hint.
     """
     tally = Tally()
     largest: dict[tuple[str, str], dict[str, tuple[float, Metric, str]]] = {}
