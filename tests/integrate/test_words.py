@@ -292,7 +292,7 @@ def test_a_tolerance_it_cannot_do_is_refused(tolerance) -> None:
 def test_wrong_machine_code_is_caught_by_the_step_that_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     """A wrong sign in one lane, in one of the two recurrences or in both."""
     monkeypatch.setattr(double_double_run, "machine", lru_cache(steps.build))  # not from the disk
-    monkeypatch.setattr(engines, "_made", {})
+    monkeypatch.setattr(engines._double_double, "results", {})
     damaged = [list(part) for part in recurrence.GATHERED]
     damaged[2][4] = (6, -1)
     monkeypatch.setattr(recurrence, "GATHERED", tuple(map(tuple, damaged)))

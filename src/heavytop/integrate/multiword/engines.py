@@ -231,9 +231,9 @@ def compiled(arithmetic: Arithmetic, system: System, attitude: bool) -> float:
     """
     if isinstance(arithmetic, DoubleDouble):
         return _double_double(system, attitude)
-    return (
-        _integers(system, attitude) if isinstance(arithmetic, Integers) else _words(arithmetic.grid, system, attitude)
-    )
+    if isinstance(arithmetic, Integers):
+        return _integers(system, attitude)
+    return _words(arithmetic.grid, system, attitude)
 
 
 @OncePerArguments
