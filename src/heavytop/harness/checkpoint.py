@@ -211,13 +211,13 @@ def identity_of(report: Report) -> dict[str, str]:
     }
 
 
-def require_same(there: dict[str, str], here: dict[str, str], where: Path) -> None:
+def require_same(stored: dict[str, str], current: dict[str, str], file: Path) -> None:
     """Raises InputError with each key in which two identities differ, and both values."""
-    different = [key for key in (*there, *(here.keys() - there.keys())) if there.get(key) != here.get(key)]
+    different = [key for key in (*stored, *(current.keys() - stored.keys())) if stored.get(key) != current.get(key)]
     if different:
         raise InputError(
-            f"{where} belongs to another run: "
-            + ", ".join(f"{key} is {there.get(key)} there and {here.get(key)} now" for key in different)
+            f"{file} belongs to another run: "
+            + ", ".join(f"{key} is {stored.get(key)} there and {current.get(key)} now" for key in different)
             + ".",
             "Resume with the same plan, program and machine, or give another --out.",
         )

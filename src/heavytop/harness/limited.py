@@ -45,7 +45,7 @@ _AHEAD, _SHORT = 4, 0.25
 
 @dataclass(slots=True)
 class _Record:
-    """Of one integrator: the largest ratio of seconds to cost; rows that ran out of time, in succession and in all."""
+    """Per integrator: the largest ratio of seconds to cost; rows that ran out of time, in succession and in all."""
 
     ratio: float = 1.0
     in_succession: int = 0
@@ -228,7 +228,7 @@ def in_processes(
                 try:
                     row = _finished_row(worker, tasks[index], costs[index], limits)
                 except BrokenProcessPool:
-                    how = worker.ending
+                    ending = worker.ending
                     worker.end()
                     waiting.extendleft(reversed(behind))
                     deaths[index] += 1
@@ -237,7 +237,7 @@ def in_processes(
                         continue
                     if not tasks[index].is_third_party:
                         raise died(tasks[index], deaths[index]) from None
-                    row = ended_its_process(tasks[index], deaths[index], how)
+                    row = ended_its_process(tasks[index], deaths[index], ending)
                 if row is not None:
                     if worker.rows:
                         begun(tasks[worker.rows[0][0]])
@@ -254,13 +254,13 @@ def _next_task(worker: _Worker, pool: Sequence[_Worker], waiting: deque[int], ta
     Among the first of them one in the format of its last task, else in one that no other worker has: each process
     compiles for itself.
     """
-    chosen = 0
+    position = 0
     if not tasks[waiting[0]].is_third_party:
         others = {busy.precision for busy in pool if busy is not worker}
         formats = [tasks[index].key.precision for index in islice(waiting, _LOOKAHEAD)]
-        chosen = min(range(len(formats)), key=lambda i: (formats[i] != worker.precision, formats[i] in others))
-    index = waiting[chosen]
-    del waiting[chosen]
+        position = min(range(len(formats)), key=lambda i: (formats[i] != worker.precision, formats[i] in others))
+    index = waiting[position]
+    del waiting[position]
     worker.precision = tasks[index].key.precision
     return index
 
@@ -293,7 +293,7 @@ def in_limited_process(kind: MeasuredKind, task: Task, limit: float) -> tuple[Ro
 
     The child is reused for the next row; it ends with this process.  For one thread at a time.
     """
-    worker, limits, how = _reused_worker(), RowLimits(limit), ""
+    worker, limits, ending = _reused_worker(), RowLimits(limit), ""
     for _ in range(_MOST_DEATHS):
         worker.submit(0, limit, kind, task, Saved())
         try:
@@ -302,9 +302,9 @@ def in_limited_process(kind: MeasuredKind, task: Task, limit: float) -> tuple[Ro
                 worker.greet()
             return row, worker.seconds()
         except BrokenProcessPool:
-            how = worker.ending
+            ending = worker.ending
             worker.end()
-    return ended_its_process(task, _MOST_DEATHS, how), 0.0
+    return ended_its_process(task, _MOST_DEATHS, ending), 0.0
 
 
 def _wait(pool: Sequence[_Worker]) -> None:

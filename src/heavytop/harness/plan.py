@@ -215,21 +215,21 @@ def _by_name(
 
     Raises InputError for a file that describes none, and where another integrator has the same name.
     """
-    known = dict(defined)
+    sources = dict(defined)
 
     def by_name(table: Any) -> Any:
         changes: dict[str, Any] = {}
         if getattr(table, "ladders", None):
             changes["ladders"] = list(map(by_name, table.ladders))
         text = getattr(table, "integrator", "")
-        source = text if text in known else named(text, folder)
+        source = text if text in sources else named(text, folder)
         if not isinstance(source, str):
-            if known.setdefault(source.name, source) != source:
+            if sources.setdefault(source.name, source) != source:
                 raise InputError(f"The plan {plan.name} gives one name to two integrators, {source.name}.", _RENAME)
             changes["integrator"] = source.name
         return msgspec.structs.replace(table, **changes)
 
-    return msgspec.structs.replace(plan, measure=list(map(by_name, plan.measure))), known
+    return msgspec.structs.replace(plan, measure=list(map(by_name, plan.measure))), sources
 
 
 def with_integrator(plan: Plan, integrator: str | IntegratorSource) -> Plan:
@@ -242,7 +242,7 @@ def with_integrator(plan: Plan, integrator: str | IntegratorSource) -> Plan:
     if not isinstance(integrator, str) and not is_third_party(integrator.name):
         raise InputError(f"The integrator {integrator.name} has the name of a built-in one.", _RENAME)
     require_integrator(integrator)
-    added = [other for table in plan.measure if (other := table.with_integrator(integrator)) is not None]
+    added = [extended for table in plan.measure if (extended := table.with_integrator(integrator)) is not None]
     if not added:
         raise InputError(f"The plan {plan.name} does not measure {HEYOKA}.", "Use --plan gate.")
     return msgspec.structs.replace(plan, measure=[*plan.measure, *added])
@@ -344,16 +344,16 @@ def expand(plan: Plan, seed: int = 0, defined: Mapping[str, IntegratorSource] | 
 
 def _own_tops(plan: Plan) -> dict[str, Case]:
     """The plan's own tops by name."""
-    own: dict[str, Case] = {}
+    tops: dict[str, Case] = {}
     for top in plan.top:
         _require_name(top.name, "top")
-        if top.name in own:
+        if top.name in tops:
             raise InputError(f"The plan {plan.name} has two tops {top.name!r}.", _RENAME)
         if top.name in CASES or top.name in named_bodies():
             raise InputError(f"The plan's top {top.name!r} has the name of a built-in case.", _RENAME)
         with prefixed(f"The plan's top {top.name!r}"):
-            own[top.name] = top.case()
-    return own
+            tops[top.name] = top.case()
+    return tops
 
 
 def warnings(plan: Plan) -> list[str]:
@@ -368,11 +368,11 @@ def _swept(plan: Plan) -> dict[str, Sequence[Case]]:
     swept: dict[str, Sequence[Case]] = {}
     for index, sweep in enumerate(plan.sweep):
         _require_name(sweep.name, "sweep")
-        for other in plan.sweep[:index]:
-            if sweep.name == other.name:
+        for earlier in plan.sweep[:index]:
+            if sweep.name == earlier.name:
                 raise InputError(f"The plan {plan.name} has two sweeps {sweep.name!r}.", _RENAME)
-            if sweep == msgspec.structs.replace(other, name=sweep.name):
-                raise InputError(f"The sweeps {other.name} and {sweep.name} are the same.", "Take one of them out.")
+            if sweep == msgspec.structs.replace(earlier, name=sweep.name):
+                raise InputError(f"The sweeps {earlier.name} and {sweep.name} are the same.", "Take one of them out.")
         swept[f"sweep:{sweep.name}"] = sweep.cases()
     return swept
 

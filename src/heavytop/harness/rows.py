@@ -163,8 +163,8 @@ def run_with_attitude(task: Task) -> tuple[Trajectory, AttitudeScorer]:
     times, keep = ([exact(number(time, precision)) for time in part] for part in (task.times, task.keep))
     xi = resolve(case.body or case.top, case.given_start or case.start).xi
     problem = Problem.of(case.top, case.start, precision, case.system, xi)
-    known = truth(replace(problem, xi=None), times)
-    scorer = AttitudeScorer(problem, known, case.top, case.start, times, keep)
+    reference = truth(replace(problem, xi=None), times)
+    scorer = AttitudeScorer(problem, reference, case.top, case.start, times, keep)
     run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer, xi=xi)
     return run, scorer
 

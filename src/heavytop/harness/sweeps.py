@@ -68,13 +68,13 @@ class SweepGrid(Strict, tag="grid"):
         """The points; raises InputError where any of them is invalid."""
         if self.system is not None:
             system(self.system)
-        axes = [self._axis(what) for what in _AXES]
+        axes = [self._axis(quantity) for quantity in _AXES]
         shape = [len(axis) for axis in axes]
         size = _bounded(self.name, prod(shape))
-        for what, axis in zip(_AXES, axes, strict=True):
-            if twice := [value for value, count in Counter(axis).items() if count > 1]:
+        for quantity, axis in zip(_AXES, axes, strict=True):
+            if repeated := [value for value, count in Counter(axis).items() if count > 1]:
                 raise InputError(
-                    f"The sweep {self.name} lists the {what} {_text(twice[0])} twice.", "List each value once."
+                    f"The sweep {self.name} lists the {quantity} {_text(repeated[0])} twice.", "List each value once."
                 )
         if not any(isinstance(axis, list) for axis in axes):
             raise InputError(f"The sweep {self.name} varies nothing.", "Give a list of values, or use [[top]].")
@@ -99,24 +99,24 @@ class SweepGrid(Strict, tag="grid"):
     @property
     def exact_data(self) -> str:
         """The number of values of each quantity, and a digest of all of them."""
-        axes = [self._axis(what) for what in _AXES]
+        axes = [self._axis(quantity) for quantity in _AXES]
         digest = hashlib.sha256(str(axes).encode()).hexdigest()
         return f"grid of {' x '.join(str(len(axis)) for axis in axes)}, {digest[:16]}"
 
-    def _axis(self, what: str) -> list[Any] | tuple[Any]:
+    def _axis(self, quantity: str) -> list[Any] | tuple[Any]:
         """The values of one quantity: a list where the plan lists them, a tuple of one for a single value."""
-        values = getattr(self, what)
+        values = getattr(self, quantity)
         if values is None:  # no rotor
             return (None,)
         with prefixed(f"The sweep {self.name}"):
-            if what == "weight":
+            if quantity == "weight":
                 return [exact(value) for value in values] if isinstance(values, list) else (exact(values),)
             if not values or all(isinstance(part, list) for part in values):
-                return [vector(value, what) for value in values]
+                return [vector(value, quantity) for value in values]
             if all(isinstance(part, str) for part in values):
-                return (vector(values, what),)
+                return (vector(values, quantity),)
         raise InputError(
-            f"The sweep {self.name}: {what} mixes numbers and lists.", "Give three numbers, or lists of three."
+            f"The sweep {self.name}: {quantity} mixes numbers and lists.", "Give three numbers, or lists of three."
         )
 
 
@@ -164,7 +164,7 @@ class Random(Strict, tag="random"):
 
     def _case(self, index: int) -> Case:
         parts = self.integers(index)
-        inertia, centre, omega = ([Fraction(i, 1000) for i in parts[at : at + 3]] for at in (0, 4, 7))
+        inertia, centre, omega = ([Fraction(i, 1000) for i in parts[first : first + 3]] for first in (0, 4, 7))
         top = HeavyTop(inertia, Fraction(parts[3], 1000), centre)
         gamma = [Fraction(i, parts[13]) for i in parts[10:13]]
         return Case(f"{self.name}[{index}]", "drawn at random", HEAVY_TOP, top, State(omega, gamma))

@@ -187,11 +187,10 @@ def _timed(policy: Policy, old: dict[str, Any], new: dict[str, Any]) -> bool:
 
 def _same_machine_and_versions(old: dict[str, Any], new: dict[str, Any]) -> bool:
     """Whether processor and versions agree, apart from that of this program, which is being compared."""
-    first, second = (
-        {name: version for name, version in row.get("packages", {}).items() if name != "heavytop"} for row in (old, new)
-    )
-    known = (*_MACHINE, *_VERSIONS)
-    return first == second and all(name in old and old[name] == new.get(name) for name in known)
+    packages = (environment.get("packages", {}).items() for environment in (old, new))
+    first, second = ({name: version for name, version in entries if name != "heavytop"} for entries in packages)
+    names = (*_MACHINE, *_VERSIONS)
+    return first == second and all(name in old and old[name] == new.get(name) for name in names)
 
 
 def _differences(old: dict[str, Any], new: dict[str, Any]) -> list[tuple[str, str, str]]:

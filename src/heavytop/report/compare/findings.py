@@ -217,13 +217,13 @@ class Changes:
         ):
             return ""
         finest = max(point.steps[0] for point in points)
-        lost = {math.log10(change.old.steps): change.largest_loss for change in changed if change.old}
-        if finest not in lost or any(abs(_steps(change)) > _STEPS_MOVED for change in changed):
+        losses = {math.log10(change.old.steps): change.largest_loss for change in changed if change.old}
+        if finest not in losses or any(abs(_steps(change)) > _STEPS_MOVED for change in changed):
             return ""
-        most = lost.pop(finest)
-        if any(loss > _LESS * most for loss in lost.values()):
+        largest = losses.pop(finest)
+        if any(loss > _LESS * largest for loss in losses.values()):
             return ""
-        return "lost less" if lost else "are the same"
+        return "lost less" if losses else "are the same"
 
     @property
     def worst_first(self) -> list[Change]:
@@ -364,9 +364,9 @@ def _curve(row: Identity) -> tuple[str, str, str]:
 def _where(row: Identity, at: bool = True) -> str:
     """``lagrange up to T = 100 (mine:rk4, step 1/100, double)``."""
     key = row.key
-    inside = ", ".join(part for part in (clip(row.program, 40), key.subject.asked, key.precision) if part)
+    details = ", ".join(part for part in (clip(row.program, 40), key.subject.asked, key.precision) if part)
     end = f" up to T = {short(key.horizon.removeprefix('-'))}" if at and key.horizon not in ("", "0") else ""
-    return f"{_case(row)}{end} ({inside})"
+    return f"{_case(row)}{end} ({details})"
 
 
 def _case(row: Identity) -> str:
@@ -492,8 +492,8 @@ def _digits_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Se
         worst = max(changes, key=lambda change: (sign * change.lost, change.identity.case))
         assert worst.digits is not None
         old, new = map(digits_text, worst.digits)
-        also = len(changes) - 1
-        more = f", {'fewer' if sign > 0 else 'more'} on {plural(also, 'other row')} too" if also else ""
+        others = len(changes) - 1
+        more = f", {'fewer' if sign > 0 else 'more'} on {plural(others, 'other row')} too" if others else ""
         if worst.lost > _ENDS_AS_BEFORE and sign > 0 and all(_ends_as_before(change) for change in changes):
             more += "; the last state is as it was: errors are between steps, of the dense output"
         yield Sentence(
@@ -506,10 +506,10 @@ def _steps_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sen
     moved = [c for c in rows if c.old is not None and c.new is not None and c.old.steps and c.new.steps]
     moved = [c for c in moved if abs(_steps(c)) > _STEPS_MOVED]
     for changes in _by_integrator(moved):
-        most = max(changes, key=lambda change: abs(_steps(change)))
-        assert most.old is not None
-        assert most.new is not None
-        text = f"Steps {most.old.steps} → {most.new.steps} at the same setting on {_where(most.identity)}."
+        largest = max(changes, key=lambda change: abs(_steps(change)))
+        assert largest.old is not None
+        assert largest.new is not None
+        text = f"Steps {largest.old.steps} → {largest.new.steps} at the same setting on {_where(largest.identity)}."
         yield Sentence(text, frozenset(change.identity for change in changes))
 
 
@@ -581,13 +581,13 @@ def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdic
         values = f" {short(finding.baseline or '-')} → {short(finding.candidate or '-')}"
         if finding.of == "series":
             values = " at its samples"
-        why = f", {finding.reason}" if finding.reason and change.decades(finding.metric) is None else ""
-        together = frozenset(c.identity for _, c, _ in cases)
-        also = f"; also on {plural(len(together) - 1, 'other row')}" if len(together) > 1 else ""
+        reason = f", {finding.reason}" if finding.reason and change.decades(finding.metric) is None else ""
+        named = frozenset(c.identity for _, c, _ in cases)
+        also = f"; also on {plural(len(named) - 1, 'other row')}" if len(named) > 1 else ""
         error = Verdict.WORSE in verdicts and (finding.of == "series" or change.decades(finding.metric) is not None)
         coarser = {changes.coarser(c) for _, c, _ in cases} if error else {""}
         below = "" if "" in coarser else _LOWER_ORDER.format(min(coarser, key=len))
-        yield Sentence(f"{what[0].upper()}{what[1:]}{values} on {_where(change.identity)}{why}{also}{below}.", together)
+        yield Sentence(f"{what[0].upper()}{what[1:]}{values} on {_where(change.identity)}{reason}{also}{below}.", named)
 
 
 def _is_covered(change: Change, finding: Finding, quantity: Quantity | None) -> bool:

@@ -133,8 +133,8 @@ def _between_classes(old: Law, new: Law) -> bool:
 
 def _judge_exponents(old: Law, new: Law, rerun: bool) -> Judged:
     if old.exponent is None or new.exponent is None:
-        known = old.exponent is not None or new.exponent is not None
-        return (Verdict.INCOMPARABLE, "an exponent in one report only") if known else SAME
+        in_one_report = old.exponent is not None or new.exponent is not None
+        return (Verdict.INCOMPARABLE, "an exponent in one report only") if in_one_report else SAME
     if old.low is not None and new.low is not None:
         return _judge_intervals("exponent", interval_of(old), interval_of(new), new.exponent, rerun, _EXPONENT_GAP)
     (low, high), (new_low, new_high) = interval_of(old), interval_of(new)
@@ -160,10 +160,10 @@ def _judge_intervals(quantity: str, old: Interval, new: Interval, middle: float,
     width, new_width = (interval[1] - interval[0] for interval in (old, new))
     shrinkage = min(1.0, (_BY_CHANCE if rerun else 1.0) * width / new_width) if new_width > 0 else 1.0
     low, high = (middle + (end - middle) * shrinkage for end in new)
-    least = gap * width if rerun else 0.0
-    if low - old[1] > least:
+    required = gap * width if rerun else 0.0
+    if low - old[1] > required:
         return Verdict.WORSE, f"a larger {quantity}"
-    if old[0] - high > least:
+    if old[0] - high > required:
         return Verdict.BETTER, f"a smaller {quantity}"
     if new_width > _WIDER * width:
         return Verdict.WORSE, f"noise: the interval of the {quantity} is {new_width:.2g} wide, not {width:.2g}"
@@ -219,9 +219,9 @@ def judge_series(old: Series, new: Series, allowed: float, floor: float, exactly
             return Verdict.WORSE, "a value is no longer a number"
         if any(b == MISSING and a not in _NOT_NUMBERS for a, b in pairs):
             return Verdict.INCOMPARABLE, "a value is no longer measured"
-        lost = sum(b == UNRESOLVED != a for a, b in pairs)
-        if lost > 2 + len(pairs) / _LOST_SHARE:
-            return Verdict.INCOMPARABLE, f"{lost} values are no longer resolved"
+        unresolved = sum(b == UNRESOLVED != a for a, b in pairs)
+        if unresolved > 2 + len(pairs) / _LOST_SHARE:
+            return Verdict.INCOMPARABLE, f"{unresolved} values are no longer resolved"
         numbers = [pair for pair in pairs if _WORDS.isdisjoint(pair)]
         before, after = ([pair[side] for pair in numbers] for side in (0, 1))
     if not before:

@@ -131,13 +131,13 @@ def _errors(
         return SAME
     if math.isinf(a) or math.isinf(b):
         return (Verdict.WORSE, "no longer exactly 0") if b > a else (Verdict.BETTER, "now exactly 0")
-    lost = b - a
-    if abs(lost) <= allowed:
+    loss = b - a
+    if abs(loss) <= allowed:
         return SAME
     beyond = f", noise moves it by {noise / BITS:.1f} bits" if noise > limits.loss else ""
-    if lost > 0:
-        return Verdict.WORSE, f"{lost / BITS:.1f} bits lost{beyond}"
-    return Verdict.BETTER, f"{-lost / BITS:.1f} bits gained{beyond}"
+    if loss > 0:
+        return Verdict.WORSE, f"{loss / BITS:.1f} bits lost{beyond}"
+    return Verdict.BETTER, f"{-loss / BITS:.1f} bits gained{beyond}"
 
 
 def _unresolved(old: Metric, new: Metric, lost: float, allowed: float) -> Judged:
@@ -271,8 +271,8 @@ _TOO_LONG = {OUT_OF_TIME, NOT_ASKED}
 
 def ended(row: Row, which: str) -> str:
     """``the candidate ended as failed at t = 0: it returned NaN``."""
-    why = f": {row.reference.reason}" if row.outcome in UNMEASURED else ""
-    return f"the {which} ended as {row.outcome} at t = {row.time_reached}{why}"
+    reason = f": {row.reference.reason}" if row.outcome in UNMEASURED else ""
+    return f"the {which} ended as {row.outcome} at t = {row.time_reached}{reason}"
 
 
 def judge_outcomes(old: Row, new: Row, duration: float) -> Judged | None:

@@ -190,9 +190,9 @@ def _sections(ticks: Sequence[str], tracks: Sequence[Track]) -> tuple[list[Secti
         )
         if drawable and name in drawn:
             section.pictures.append(_picture(section, drawable[:MOST_CURVES], ticks, f"h{number}"))
-        missing = len(drawable) - (MOST_CURVES if section.pictures else 0)
-        if missing > 0:
-            section.notes.append(f"{missing} more in the table alone; --metric and --case choose which are drawn.")
+        undrawn = len(drawable) - (MOST_CURVES if section.pictures else 0)
+        if undrawn > 0:
+            section.notes.append(f"{undrawn} more in the table alone; --metric and --case choose which are drawn.")
         parts[not any(track.steps for track in members)].append(section)
     return parts
 

@@ -254,9 +254,9 @@ def _one_line(text: str) -> str:
 def _caption(facts: dict[str, str]) -> str:
     """Caption that makes the table readable alone."""
     methods = ("digits", "method") if "digits" in facts else ("precision", "integrator")
-    known = [(key, _escaped(facts[key])) for key in ("name", *_DATA, *methods) if key in facts]
-    named_facts = "; ".join(f"{_escaped(_one_line(key))} " + text.replace("/", r"/\allowbreak ") for key, text in known)
-    return f"{named_facts}. heavytop {_escaped(facts['version'])}."
+    entries = [(key, _escaped(facts[key])) for key in ("name", *_DATA, *methods) if key in facts]
+    listed = "; ".join(f"{_escaped(_one_line(key))} " + text.replace("/", r"/\allowbreak ") for key, text in entries)
+    return f"{listed}. heavytop {_escaped(facts['version'])}."
 
 
 def _escaped(text: str) -> str:
@@ -269,11 +269,11 @@ def _without_paths(command: str) -> str:
     """The command without its output files, and with the names, not paths, of its input files."""
     options = tuple(f"{option}=" for option in (*_WRITTEN, *_READ))
     words = [w for word in shlex.split(command) for w in (word.split("=", 1) if word.startswith(options) else [word])]
-    kept = []
+    cleaned = []
     for previous, word in pairwise(["", *words]):
         if word not in _WRITTEN and (previous not in _WRITTEN or word.startswith("--")):
-            kept.append(Path(word).name if previous in _READ else word)
-    return shlex.join(kept)
+            cleaned.append(Path(word).name if previous in _READ else word)
+    return shlex.join(cleaned)
 
 
 _WRITTEN, _READ = ("--csv", "--latex", "--bibtex"), ("--file", "--integrator")
@@ -303,9 +303,9 @@ def _tex_parts(value: str, radius: str | None) -> list[str]:
     if value in ("nan", "inf", "-inf"):
         return ["undefined" if value == "nan" else rf"${value.replace('inf', chr(92) + 'infty')}$"]
     mantissa, _, power = value.lower().partition("e")
-    whole, _, decimals = mantissa.partition(".")
+    integer, _, decimals = mantissa.partition(".")
     pieces = [decimals[i : i + _DIGITS_A_LINE] for i in range(0, len(decimals), _DIGITS_A_LINE)] or [""]
-    first = whole + (f".{pieces[0]}" if pieces[0] else "")
+    first = integer + (f".{pieces[0]}" if pieces[0] else "")
     tail = rf" \pm \num{{{radius}}}" if radius is not None else ""
     if len(pieces) == 1:
         return [rf"$\num{{{first}{f'e{power}' if power else ''}}}{tail}$"]
@@ -349,8 +349,8 @@ def motion_text(motion: Motion, table: MotionTable) -> RenderableType:
     parts: list[RenderableType] = [Text(head), *_attitude_at_start(table)]
     parts += _at_each_time(table)
     if not motion.complete:
-        why = f" {run.integrator} says: {printable(run.flags['failure'])}" if "failure" in run.flags else ""
-        parts += [Text(), Text(f"Reached t = {motion.to_json()['time_reached']} only.{why}", style="bold")]
+        reason = f" {run.integrator} says: {printable(run.flags['failure'])}" if "failure" in run.flags else ""
+        parts += [Text(), Text(f"Reached t = {motion.to_json()['time_reached']} only.{reason}", style="bold")]
     elif motion.drift:
         quantities = [(metric.quantity, metric) for metric in motion.drift.values()]
         worst = [
@@ -360,8 +360,8 @@ def motion_text(motion: Motion, table: MotionTable) -> RenderableType:
         parts += [Text(), Text(f"Largest drift of the first integrals at these times: {drifts}")]
     if (steady := run.stability) is not None:
         parts += [Text(), Text(f"{steady.text(precision.bits).capitalize()}.")]
-    if lost := run.amplification_text():
-        parts += [Text(), Text(f"{lost[:1].upper()}{lost[1:]}.")]
+    if sentence := run.amplification_text():
+        parts += [Text(), Text(f"{sentence[:1].upper()}{sentence[1:]}.")]
     return Group(*parts, *_undefined(table))
 
 

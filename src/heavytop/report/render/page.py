@@ -170,8 +170,8 @@ def detailed(rows: Sequence[Row]) -> tuple[list[Row], int]:
     """The rows shown one by one, the first and the worst of the others, and the number left out."""
 
     def goodness(row: Row) -> tuple[bool, bool, float]:
-        kept = digits_kept(row)
-        return row.outcome == "success", row.finite, math.inf if kept is None else kept
+        digits = digits_kept(row)
+        return row.outcome == "success", row.finite, math.inf if digits is None else digits
 
     worst = sorted(rows[MOST_ROWS:], key=goodness)[:MOST_WORST]
     return [*rows[:MOST_ROWS], *worst], max(0, len(rows) - MOST_ROWS - len(worst))
@@ -283,22 +283,22 @@ def digits_headline(rows: Sequence[Row]) -> Headline | None:
     digits, is the last choice.
     """
     finished = [row for row in rows if row.outcome == "success"]
-    known = [(row, kept) for row in finished if (kept := digits_kept(row)) is not None]
-    at_least = "" if known else "at least "
-    known = known or [(row, kept) for row in finished if (kept := _at_least(row)) is not None]
-    known = [pair for pair in known if not pair[0].reference.until] or known
-    theirs = [pair for pair in known if pair[0].key.subject.name not in (HEYOKA, MULTIWORD)]
-    ours = [pair for pair in known if pair[0].key.subject.name == HEYOKA]
-    other = HEYOKA if theirs else MULTIWORD
-    others_kept = {_motion_key(row): kept for row, kept in known if row.key.subject.name == other}
-    candidates = theirs or ours or known
-    chosen = [pair for pair in candidates if theirs and _motion_key(pair[0]) in others_kept] or candidates
+    with_digits = [(row, digits) for row in finished if (digits := digits_kept(row)) is not None]
+    at_least = "" if with_digits else "at least "
+    with_digits = with_digits or [(row, digits) for row in finished if (digits := _at_least(row)) is not None]
+    with_digits = [pair for pair in with_digits if not pair[0].reference.until] or with_digits
+    theirs = [pair for pair in with_digits if pair[0].key.subject.name not in (HEYOKA, MULTIWORD)]
+    ours = [pair for pair in with_digits if pair[0].key.subject.name == HEYOKA]
+    compared_with = HEYOKA if theirs else MULTIWORD
+    peers = {_motion_key(row): digits for row, digits in with_digits if row.key.subject.name == compared_with}
+    candidates = theirs or ours or with_digits
+    chosen = [pair for pair in candidates if theirs and _motion_key(pair[0]) in peers] or candidates
     if not chosen:
         return None
     last = max(abs(exact(row.horizon)) for row, _ in chosen)
     longest = [pair for pair in chosen if abs(exact(pair[0].horizon)) == last]
-    row, kept = min(longest, key=lambda pair: pair[1])
-    sentence = f"{clip(row.key.subject.name, 40)} in {clip(row.precision, 20)}: {at_least}{digits_text(kept)} of "
+    row, digits = min(longest, key=lambda pair: pair[1])
+    sentence = f"{clip(row.key.subject.name, 40)} in {clip(row.precision, 20)}: {at_least}{digits_text(digits)} of "
     sentence += f"{digits_of(row.bits)} digits right to T = {short(row.horizon)} ({clip(row.case, 40)}"
     cases = {row.case for row, _ in longest}
     lost = [
@@ -311,7 +311,7 @@ def digits_headline(rows: Sequence[Row]) -> Headline | None:
     ]
     sentence += f", worst of {len(cases)})" if len(cases) > 1 and not lost else ")"
     sentence += f", none on {', '.join(lost[:_LOST])}" if lost else ""
-    sentence += f"; {other}: {digits_text(others_kept[_motion_key(row)])}." if _motion_key(row) in others_kept else "."
+    sentence += f"; {compared_with}: {digits_text(peers[_motion_key(row)])}." if _motion_key(row) in peers else "."
     return Headline(sentence, shown=In.SHORT | In.FULL | In.PAGE)
 
 
@@ -493,8 +493,8 @@ def _followed(rows: Sequence[Row], drifts: bool, condition: str) -> str:
     total = sum(bool(_laws(row, drifts)) for row in rows)
     if not laws:
         return ""
-    most, *runner_up = laws.most_common(2)
-    shown = [most, *(pair for pair in runner_up if 3 * pair[1] >= total > 1)]
+    commonest, *runner_up = laws.most_common(2)
+    shown = [commonest, *(pair for pair in runner_up if 3 * pair[1] >= total > 1)]
     # regular motions before those that amplify every error
     (growth, count), *others = sorted(shown, key=lambda pair: pair[0] == "exponential")
     law = _HOW.get(growth, f"like {growth}") + (f" ({count} of {total} ensembles{condition})" if total > 1 else "")

@@ -121,8 +121,8 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         columns=["case", "run", "quantity", "largest", "last |t|", "last", "law", "exponent", "digits gone at |t|"],
         place=30,
     )
-    wanted = set(first)
-    names = sorted(cases, key=lambda case: case not in wanted)
+    preferred = set(first)
+    names = sorted(cases, key=lambda case: case not in preferred)
     left_out(section, len(names) - MOST_PLOTS, "case")
     for name in names[:MOST_PLOTS]:
         drawn = [_chart(section, name, column, cases[name]) for column in _COLUMNS]
@@ -184,12 +184,12 @@ def _curve(section: Section, chart: _Chart, case: str, key: Key, row: Row, quant
             section.key(_FITTED)
         chart.alternative.append(_law_sentence(key.label, law))
         chart.ends.append(End(_law_short(law), colour, x[-1], y[-1]))
-    what = quantity.component.replace("_", " ")
-    chart.alternative.append(f"{key.label}: {scientific(y[-1])} ε ({what}) at |t| = {scientific(x[-1])}.")
-    named = f"{'drift of' if quantity.name == DRIFT else 'error'} {what}"
-    most = row.metrics.get(quantity.over("max").text)
+    component = quantity.component.replace("_", " ")
+    chart.alternative.append(f"{key.label}: {scientific(y[-1])} ε ({component}) at |t| = {scientific(x[-1])}.")
+    named = f"{'drift of' if quantity.name == DRIFT else 'error'} {component}"
+    largest = row.metrics.get(quantity.over("max").text)
     last = [short(series.times[-1]), short(series.values[-1])]
-    section.rows.append([case, key.label, named, short(most.value) if most else "", *last, *_law_words(law)])
+    section.rows.append([case, key.label, named, short(largest.value) if largest else "", *last, *_law_words(law)])
 
 
 def _note_on_samples(rows: Iterable[Row]) -> list[str]:
@@ -198,9 +198,9 @@ def _note_on_samples(rows: Iterable[Row]) -> list[str]:
     fewer = [pair for pair in counts if pair[0] < pair[1]]
     if not fewer:
         return []
-    drawn, taken = (_span(sorted(part)) for part in zip(*fewer, strict=True))
+    drawn, total = (_span(sorted(part)) for part in zip(*fewer, strict=True))
     between = "a larger error may lie between; digits and tables count all"
-    return [f"Curves show {drawn} of {taken} samples, evenly in log |t|: {between}."]
+    return [f"Curves show {drawn} of {total} samples, evenly in log |t|: {between}."]
 
 
 def _span(counts: Sequence[int]) -> str:
@@ -307,9 +307,9 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     )
     if any(row.reference.how == "computed" for _, row in runs):
         section.notes.append(COMPUTED)
-    wanted = set(first)
+    preferred = set(first)
     lanes: dict[str, list[_Run]] = {}
-    for source, row in sorted(runs, key=lambda run: (bool(run[1].key.subject.variant), run[1].case not in wanted)):
+    for source, row in sorted(runs, key=lambda run: (bool(run[1].key.subject.variant), run[1].case not in preferred)):
         options = variant(row, sources)
         lanes.setdefault(clip(row.case, 30) + (f" ({clip(options, 30)})" if options else ""), []).append((source, row))
     usual = [name for name, members in lanes.items() if not members[0][1].key.subject.variant] or list(lanes)
@@ -330,23 +330,23 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
 
 def _digits_right(section: Section, precision: str, lanes: dict[str, list[_Run]], name: str) -> Picture:
     """The chart of one format; the run with the longest horizon is labelled, of two reports the candidate's."""
-    digits = max(row.bits for members in lanes.values() for _, row in members) * math.log10(2)
+    full = max(row.bits for members in lanes.values() for _, row in members) * math.log10(2)
     texts = {lane: f"{lane}: {_right(members[-1][1], digits_until)}" for lane, members in lanes.items()}
-    axes = new_axes(f"digits right, of {digits:.0f}", "", 0.75 + 0.19 * max(3, len(lanes)), room(texts.values()))
+    axes = new_axes(f"digits right, of {full:.0f}", "", 0.75 + 0.19 * max(3, len(lanes)), room(texts.values()))
     ends = []
     for index, (lane, members) in enumerate(lanes.items()):
         for source, row in members:
-            kept, band = _kept(row), row.metrics[RELATIVE.text].band or 0.0
-            key = Key(source, 0, "x" if kept is None else "o", old=source == "baseline", line=False)
-            if source and kept is not None:
+            right, band = _kept(row), row.metrics[RELATIVE.text].band or 0.0
+            key = Key(source, 0, "x" if right is None else "o", old=source == "baseline", line=False)
+            if source and right is not None:
                 section.key(key)
-            draw(axes, key, [kept or 0.0], [-index], 5)
+            draw(axes, key, [right or 0.0], [-index], 5)
             if band:
-                ends_of_bar = [(kept or 0.0) - band, (kept or 0.0) + band]
+                ends_of_bar = [(right or 0.0) - band, (right or 0.0) + band]
                 axes.plot(ends_of_bar, [-index] * 2, color=COLOURS[0], lw=3, alpha=0.3)
-        ends.append(End(texts[lane], COLOURS[0], kept or 0.0, -index))
-    axes.set(xlim=(-0.02 * digits, 1.02 * digits), ylim=(0.7 - len(lanes), 0.7), yticks=[])
-    axes.axvline(digits, color=COLOURS[_GREY], lw=0.9, ls=DASHED)
+        ends.append(End(texts[lane], COLOURS[0], right or 0.0, -index))
+    axes.set(xlim=(-0.02 * full, 1.02 * full), ylim=(0.7 - len(lanes), 0.7), yticks=[])
+    axes.axvline(full, color=COLOURS[_GREY], lw=0.9, ls=DASHED)
     description = spoken([f"{text}." for text in texts.values()], 24)
     return finish(axes, f"Digits right in {precision}", description, name, ends=ends)
 

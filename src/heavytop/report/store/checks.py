@@ -146,8 +146,8 @@ def _sizes(metrics: Mapping[str, Metric]) -> Iterator[str]:
         quantity = metric.quantity
         if quantity is not None and metric.log10 is not None and quantity.statistic == "max":
             for name in _keys(quantity)[1:]:
-                other = metrics.get(name)
-                if other is not None and other.log10 is not None and other.log10 > metric.log10 + CLOSE:
+                statistic = metrics.get(name)
+                if statistic is not None and statistic.log10 is not None and statistic.log10 > metric.log10 + CLOSE:
                     yield f"{name}: larger than the largest"
 
 
