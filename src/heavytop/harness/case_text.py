@@ -164,7 +164,7 @@ Member = tuple[HeavyTop, State]
 def ensemble_of(case: Case, count: int, seed: int) -> list[Member]:
     """``count`` tops with starts; growing ``count`` keeps the earlier ones.
 
-    Random starts of the top where they have a closed form of the same class as the case: the components of Ω are
+    Random starts of the top where their references are of the same class as the case's: the components of Ω are
     uniform up to the largest of the case's Ω, and γ is a rational point of the unit sphere, uniform over it; for the
     gyrostat γ is M/|M|, and |M| is from 1/2 to 3/2 of the case's.
     Else, as for a pendulum, the case itself with ``count`` perturbed roundings

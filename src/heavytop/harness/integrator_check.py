@@ -82,7 +82,7 @@ class Checked:
 
 
 def check(which: str | IntegratorSource) -> list[Checked]:
-    """Every part of the contract of a third-party integrator, or one that is named.
+    """Checks every part of the contract of an integrator, given by its name or its source.
 
     A Python integrator runs in a process of its own, which is killed where one part takes more than a minute.
     Raises InputError for an unknown integrator.

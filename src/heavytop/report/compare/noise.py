@@ -349,8 +349,8 @@ def allowed_gain(old: Metric, new: Metric) -> float:
 
 
 def of_starts(metric: Metric, row: Row) -> Metric:
-    """The metric with its band; over n starts that of the widest component of its error, for a motion that amplifies
-    one start more than the others carries errors from each component to the others.
+    """The metric with its band; over n starts that of the widest component of its error: a motion that amplifies one
+    start more than the others carries errors from each component to the others.
 
     No wider than ½ log10 n, the most by which one start can raise a RMS.
     """

@@ -438,7 +438,7 @@ class RowComparison:
         return abs(max(before, least(old.metrics, metric)) - max(after, least(new.metrics, match))) <= allowed
 
     def _metric(self, metric: Metric, match: Metric, limits: Limits, old: Row, new: Row) -> Judged:
-        """The verdict by the values, then by the noise of the candidate: worse where it exceeds chance and value and
+        """The verdict by the values, then by the noise of the candidate: worse where it exceeds chance, and value and
         noise together exceed those of the baseline.
         """
         if new.outcome != SUCCESS and metric.value == match.value in (NAN, MISSING):

@@ -86,7 +86,7 @@ def judge(
 
 
 def _not_numbers(old: Metric, new: Metric, limits: Limits) -> Judged | None:
-    """The verdict where a value is not a number in one row or in both; None where both are.
+    """The verdict where a value is not a number in one row or in both; None for two numbers.
 
     NaN is worse than any number, and not the same as NaN.  A value that was not measured is incomparable.
     """
