@@ -1,8 +1,8 @@
 """A report in the formats of tools that track numbers from commit to commit.
 
 Smaller is better for every number: log10 of the relative error (digits right with a minus sign) and of the largest
-drift of each first integral, none below the eps of its format; exponents of growth laws; seconds.  Rows without a number (a
-row that failed, an error that is NaN) are left out: :data:`LOST` counts them.
+drift of each first integral, none below the eps of its format; exponents of growth laws; seconds.  Rows without a
+number (a row that failed, an error that is NaN) are left out: :data:`LOST` counts them.
 """
 
 from __future__ import annotations
