@@ -18,9 +18,9 @@ def main() -> None:
 
 
 def _interrupted(*_: object) -> None:
-    """Leave at once: a KeyboardInterrupt in the midst of a library that loads or compiles is lost, or is another error.
+    """Exit at once: a KeyboardInterrupt while a library loads or compiles is lost, or becomes another error.
 
-    `run` has rows to keep and handles the signal itself.
+    `run` must save rows, and handles the signal itself.
     """
     if sys.stderr.isatty():
         os.write(2, b"\x1b[?25h\n")  # a progress bar had hidden the cursor

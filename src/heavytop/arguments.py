@@ -1,4 +1,4 @@
-"""Arguments of the public functions, checked: each comes back as what the inner rooms take, or is an InputError."""
+"""Checks and conversions of the arguments of public functions; invalid ones raise InputError."""
 
 from __future__ import annotations
 
@@ -36,20 +36,20 @@ from heavytop.top.equations import SYSTEMS, WHICH_SYSTEM, System, system_of
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
 
 Number: TypeAlias = Given
-"""A number: an integer, a float of any format (the exact binary number it is), or exact text such as "-2/5"."""
+"""A number: an integer, a float of any format (taken as the exact binary number), or exact text such as "-2/5"."""
 Numbers: TypeAlias = Iterable[Any]
 """A list, a tuple or an array of :data:`Number`; type checkers take lists of several kinds for lists of anything."""
 
 SLACK_BITS = 8
-"""|γ|² and |ξ|² may be off 1, and ξ·γ off 0, by so many bits of the rounding of what was given as floats."""
+"""|γ|² − 1, |ξ|² − 1 and ξ·γ of rounded data may be as large as eps times 2 to this power."""
 _MOST = 10**18
-"""A count beyond it is not a limit."""
+"""The largest limit; larger counts are reduced to it."""
 _TYPES = "Give heavytop.HeavyTop(inertia, weight, centre) and heavytop.State(omega, gamma)."
 _Kind = TypeVar("_Kind", HeavyTop, State)
 
 
 def is_a(value: object, kind: type[_Kind], what: str) -> _Kind:
-    """``value``, which must be of that kind."""
+    """``value``, checked to be of type ``kind``."""
     if not isinstance(value, kind):
         raise InputError(f"{what} = {quoted(value)} is not a {kind.__name__}.", _TYPES)
     return value
@@ -59,11 +59,11 @@ def is_a(value: object, kind: type[_Kind], what: str) -> _Kind:
 def motion(
     top: object, start: object, precision: Precision = DOUBLE, *, of_any_size: bool = False
 ) -> tuple[HeavyTop | Body, State]:
-    """A top, or a body, and a start that it can have.
+    """A top, or a body, and a start that is possible for it.
 
-    of_any_size: for exact computations, which no format bounds.
-    Raises InputError for other types, data beyond 1e150, and a γ off the unit sphere by more than rounding to
-    ``precision`` explains.
+    of_any_size: for exact computations, which have no bounds.
+    Raises InputError for other types, data beyond 1e150, and a γ that deviates from the unit sphere by more than
+    rounding to ``precision``.
     """
     body: HeavyTop | Body = top if isinstance(top, Body) else is_a(top, HeavyTop, "top")
     state = is_a(start, State, "start")
@@ -75,7 +75,7 @@ def motion(
 
 
 def _level_of_the_caller() -> int:
-    """The ``stacklevel`` at which a warning names the line of the user that called this program."""
+    """The ``stacklevel`` of a warning that names the calling line of the user."""
     level, frame = 1, sys._getframe(1)
     while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == __package__:
         level, frame = level + 1, frame.f_back
@@ -83,14 +83,14 @@ def _level_of_the_caller() -> int:
 
 
 def slack_of(precision: Precision) -> Fraction:
-    """The error that rounding of the data may make in 1 or 0: at least that of double, whatever the run's format."""
+    """The allowed deviation from 1 or 0 due to rounded data: at least that of double, for every format of the run."""
     return max(precision.eps, DOUBLE.eps) * (1 << SLACK_BITS)
 
 
 def system(value: System | str | None, *tops: HeavyTop | Body) -> System:
-    """The system, or the one of that name; for None heavy_gyrostat where a top has a rotor, else heavy_top.
+    """The system, or the one of that name; for None heavy_gyrostat if a top has a rotor, else heavy_top.
 
-    Raises InputError for a system that does not know the rotor of a top.
+    Raises InputError for a system without rotor if a top has one.
     """
     if not (value is None or isinstance(value, str) or any(value is known for known in SYSTEMS)):
         raise InputError(f"system must be a name; got {quoted(value)}.", f"Give {WHICH_SYSTEM}, as text.")
@@ -98,7 +98,7 @@ def system(value: System | str | None, *tops: HeavyTop | Body) -> System:
 
 
 def precision(value: Precision | str) -> Precision:
-    """The format, or the one of that name; raises InputError for one that is not there, on this platform or at all."""
+    """The format, or the one of that name; raises InputError if it does not exist, or this platform lacks it."""
     if not isinstance(value, Precision):
         return require(parse(value))
     precision_of_name = require(parse(value.name))
@@ -116,7 +116,7 @@ def any_times(values: Numbers) -> list[Fraction]:
 
 
 def attitude(xi: Numbers | None, start: State, form: Precision) -> tuple[Fraction, ...] | None:
-    """ξ: a unit vector ⟂ γ but for rounding; raises InputError for any other."""
+    """ξ: a unit vector ⟂ γ up to rounding; raises InputError for any other."""
     if xi is None:
         return None
     attitude_vector = vector(xi, "xi")
@@ -209,7 +209,7 @@ def text(value: object, what: str) -> str:
 
 
 def listed(values: object, kind: type[_Kind], what: str) -> Sequence[_Kind]:
-    """One start or another thing, or several, as a sequence."""
+    """One object of type ``kind``, or several, as a sequence."""
     if isinstance(values, kind):
         return [values]
     return [is_a(value, kind, f"{what}[{i}]") for i, value in enumerate(ordered(values, what, _TYPES))]
@@ -224,19 +224,19 @@ def bodies(values: object, what: str) -> Sequence[HeavyTop | Body]:
 
 
 MOST_STATES = 100_000
-"""States, or Jacobians, that are scored."""
+"""The most states, or Jacobians, of a score."""
 
 
 def required(digits: Any) -> Fraction:
-    """How many digits are asked for, exactly; raises InputError for what is not a number, or is not positive."""
-    asked = physical(digits, "require")
-    if asked <= 0:
+    """The required digits, exact; raises InputError unless they are a positive number."""
+    number = physical(digits, "require")
+    if number <= 0:
         raise InputError(f"require must be positive, got {quoted(digits)}.", "Give a number of digits, such as 9.5.")
-    return asked
+    return number
 
 
 def component(value: Any) -> Fraction | None:
-    """An exact number out of a number of any format or text; None for NaN and infinities."""
+    """The exact value of a number of any format or of text; None for NaN and infinities."""
     if isinstance(value, str):
         return written_numbers.number(value, "a component of a state")
     try:
@@ -250,7 +250,7 @@ def component(value: Any) -> Fraction | None:
 
 
 def bits_of(value: Any) -> int:
-    """Bits of the format of a number in memory; of exact numbers, those that they are written with."""
+    """Bits of the format of a number; of exact numbers and text, those of their digits."""
     kind = type(value).__name__
     if kind in ("real128", "longdouble", "real"):
         return {"real128": QUAD.bits, "longdouble": EXTENDED.bits}.get(kind) or int(value.prec)

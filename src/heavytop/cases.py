@@ -24,12 +24,11 @@ from heavytop.top.heavy_top import HeavyTop, State, require_physical
 class Case:
     """A top with a start.
 
-    homoclinic: the closed form where the motion tends to a saddle, a permanent rotation or a periodic motion; its data
-    are dyadic, so that every format takes them exactly.
-    body, given_start: the body and the start as they were given, in other axes or with an attitude; ``top`` and
-    ``start`` are theirs in principal axes, to 256 bits where these are irrational.
-    source, units, horizon: of a named body: where its data are from, in which units, and a time up to which they are
-    used.
+    homoclinic: the closed form if the motion tends to a saddle, a permanent rotation or a periodic motion; its data are
+    dyadic, and so exact in every format.
+    body, given_start: the original body and start, in other axes or with an attitude; ``top`` and ``start`` are in
+    principal axes, to 256 bits if these are irrational.
+    source, units, horizon: of a named body, the source and units of its data, and the usual time span.
     """
 
     name: str
@@ -48,7 +47,7 @@ class Case:
     def alpha(self) -> Fraction:
         """The unit of errors of Ω: the angular velocity α of the permanent rotation that a homoclinic case tends to.
 
-        For one that tends to a periodic motion, the largest component of Ω at the start.
+        If it tends to a periodic motion, the largest component of Ω at the start.
         """
         if self.homoclinic is None:
             raise InputError(f"The case {self.name} is not homoclinic.", "Use a case such as ershkov-partial-2.")
@@ -58,7 +57,7 @@ class Case:
 
     @property
     def rate(self) -> float:
-        """The exponent at which a homoclinic case approaches its saddle, and errors leave it."""
+        """The rate at which a homoclinic case approaches its saddle, and errors grow near it."""
         if isinstance(self.homoclinic, ErshkovPartial):
             return float(self.homoclinic.rate) / 2
         if isinstance(self.homoclinic, Kovalevskaya):
@@ -97,7 +96,7 @@ def _asymptotic() -> Case:
 
 
 def _near(name: str, who: str, known: AlgebraicMotion) -> Case:
-    """Rational data within 2^-253 of a motion whose start is algebraic; their truth is the enclosure."""
+    """Rational data within 2^-253 of a motion with an algebraic start; their reference is the enclosure."""
     return Case(name, f"rational data near {who}'s motion", HEAVY_TOP, *known.rounded())
 
 
@@ -208,7 +207,7 @@ CASES: dict[str, Case] = {
 
 _FREE = {"mass": 1, "gravity": 0, "centre": (0, 0, 0), "about": PIVOT}
 _UPRIGHT = {"quaternion": (1, 0, 0, 0)}
-"""Data of a named body, and the attitude of its start, where bodies.toml has none."""
+"""Default data of a named body, and the default attitude of its start."""
 
 
 _BODY = ("mass", "gravity", "centre", "inertia", "about", "rotor")
@@ -220,7 +219,7 @@ def _tables() -> dict[str, dict[str, Any]]:
 
 
 def described_bodies() -> dict[str, tuple[str, Body]]:
-    """Description and body of each name: without its start, which takes longer."""
+    """Description and body by name; without starts, which take longer."""
     tables: dict[str, dict[str, Any]] = {name: _FREE | table for name, table in _tables().items()}
     return {
         name: (table["summary"], Body(**{key: table[key] for key in _BODY if key in table}))
@@ -239,7 +238,7 @@ def _named(name: str, table: dict[str, Any]) -> Case:
 
 @cache
 def named_bodies() -> dict[str, Case]:
-    """The named bodies by name, from bodies.toml: standard tests of multibody codes and of integrators."""
+    """The bodies of bodies.toml by name: standard tests of multibody codes and of integrators."""
     return {name: _named(name, table) for name, table in _tables().items()}
 
 
@@ -254,9 +253,7 @@ def case(name: str, more: dict[str, Case] | None = None) -> Case:
 
 
 def require_possible(case: Case) -> Case:
-    """The case; raises InputError for data that are too large, a gamma off length 1, and a start that the
-    system does not admit.
-    """
+    """The case; raises InputError for too large data, |gamma| ≠ 1, and a start that the system does not admit."""
     require_physical(case.top, case.start)
     case.start.require_unit_gamma(remedy=case.start.unit_gamma_nearby())
     case.system.parameters(case.top, case.start)

@@ -1,6 +1,4 @@
-"""A small table as text for a terminal and as HTML for a notebook, a small picture of a path beside it, and what can be
-shown of a name.
-"""
+"""Small tables as text for terminals and as HTML for notebooks, small pictures of paths, and printable names."""
 
 from __future__ import annotations
 
@@ -21,7 +19,7 @@ def plural(number: int, one: str, many: str = "") -> str:
 
 
 class Tabular:
-    """An object that shows itself as a table: ``repr`` as text, in a notebook as HTML."""
+    """An object displayed as a table: as text by ``repr``, as HTML in a notebook."""
 
     __slots__ = ()
 
@@ -38,28 +36,28 @@ class Tabular:
 class LazyLines(Sequence[Sequence[str]]):
     """The lines of a long table, each made when it is shown.
 
-    count: how many.  line: the texts of one of them.
+    count: of the lines.  line: returns the texts of the line with a given index.
     """
 
     def __init__(self, count: int, line: Callable[[int], Sequence[str]]) -> None:
-        self.places, self.line = range(count), line
+        self.indices, self.line = range(count), line
 
     def __len__(self) -> int:
-        return len(self.places)
+        return len(self.indices)
 
     def __getitem__(self, index: Any) -> Any:
-        selected = self.places[index]
+        selected = self.indices[index]
         return self.line(selected) if isinstance(selected, int) else [self.line(item) for item in selected]
 
     def __iter__(self) -> Iterator[Sequence[str]]:
-        return map(self.line, self.places)
+        return map(self.line, self.indices)
 
 
 @dataclass(frozen=True, slots=True)
 class TitledTable:
-    """A title, a table below it and notes below that; long tables show their first and last rows.
+    """A title, a table and notes; long tables show their first and last rows.
 
-    header: one text a column.  rows: as many texts each.  whole: every row is shown.
+    header: one text per column.  rows: as many texts each.  whole: whether every row is shown.
     """
 
     title: str
@@ -106,10 +104,10 @@ _ELEVATION, _AZIMUTH = math.radians(24), math.radians(-50)
 
 
 def path_picture(count: int, point: Callable[[int], Sequence[Any]], caption: str) -> str:
-    """A path on the unit sphere as a small SVG, at most 300 of its points: of one size, however many samples there are.
+    """A path on the unit sphere as a small SVG of bounded size, with at most 300 of its points.
 
-    count: of the points.  point: gives the nth, three numbers.  caption: what it is the path of.
-    "" for fewer than two points, and where one of those drawn is not finite.
+    count: of the points.  point: returns that of an index, three numbers.  caption: the subject of the path.
+    "" for fewer than two points, and if one of those drawn is not finite.
     """
     if count < 2:
         return ""
@@ -120,36 +118,36 @@ def path_picture(count: int, point: Callable[[int], Sequence[Any]], caption: str
         return ""
     if not all(math.isfinite(v) and abs(v) < _EDGE for point in points for v in point):
         return ""
-    seen = [_projected(point) for point in points]
+    projected = [_projected(point) for point in points]
     size = 2 * (_RADIUS + _EDGE)
     middle = _RADIUS + _EDGE
-    begin = f'<circle cx="{seen[0][0]:.1f}" cy="{seen[0][1]:.1f}" r="2.5" fill="#0072b2"/>'
+    begin = f'<circle cx="{projected[0][0]:.1f}" cy="{projected[0][1]:.1f}" r="2.5" fill="#0072b2"/>'
     return (
         f'<svg width="{size}" height="{size}" viewBox="0 0 {size} {size}" role="img"><title>{escape(caption)}</title>'
         f'<circle cx="{middle}" cy="{middle}" r="{_RADIUS}" fill="currentColor" fill-opacity="0.06" '
         'stroke="currentColor" stroke-opacity="0.4"/>'
-        f"{_lines(seen)}{begin}</svg><p>{escape(caption)}</p>"
+        f"{_lines(projected)}{begin}</svg><p>{escape(caption)}</p>"
     )
 
 
 def _projected(point: Sequence[float]) -> tuple[float, float, bool]:
-    """Where a point of the unit sphere is seen, and whether on its front; the third axis is upwards."""
+    """The projection of a point of the unit sphere, and whether it is on the front; the third axis points up."""
     x, y, z = point
-    across = -x * math.sin(_AZIMUTH) + y * math.cos(_AZIMUTH)
+    right = -x * math.sin(_AZIMUTH) + y * math.cos(_AZIMUTH)
     ahead = x * math.cos(_AZIMUTH) + y * math.sin(_AZIMUTH)
     up = z * math.cos(_ELEVATION) - ahead * math.sin(_ELEVATION)
     front = ahead * math.cos(_ELEVATION) + z * math.sin(_ELEVATION) >= 0
     middle = _RADIUS + _EDGE
-    return middle + _RADIUS * across, middle - _RADIUS * up, front
+    return middle + _RADIUS * right, middle - _RADIUS * up, front
 
 
-def _lines(seen: Sequence[tuple[float, float, bool]]) -> str:
+def _lines(points: Sequence[tuple[float, float, bool]]) -> str:
     """The parts of the path on the front and, faint, on the back."""
     parts: dict[bool, list[str]] = {True: [], False: []}
     last: bool | None = None
-    for index, (x, y, front) in enumerate(seen):
+    for index, (x, y, front) in enumerate(points):
         if front is not last and index:
-            before = seen[index - 1]
+            before = points[index - 1]
             parts[front].append(f"M{before[0]:.1f} {before[1]:.1f}")
         parts[front].append(f"{'L' if index else 'M'}{x:.1f} {y:.1f}")
         last = front
@@ -161,12 +159,12 @@ def _lines(seen: Sequence[tuple[float, float, bool]]) -> str:
     )
 
 
-# Names of any origin as text that terminals, XML and pictures can show.
+# Third-party names as text that terminals, XML and pictures can show.
 
 
 _NO_SHAPE = re.compile("[^\t\n\r\x20-\x7e\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def printable(text: str) -> str:
-    """Text with U+FFFD for control characters other than tabs and line breaks, and for what XML 1.0 does not have."""
+    """Text with U+FFFD for control characters other than tabs and line breaks, and for characters not in XML 1.0."""
     return _NO_SHAPE.sub("\ufffd", text)

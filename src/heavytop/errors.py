@@ -35,13 +35,13 @@ _options: ContextVar[Mapping[str, str]] = ContextVar("_options", default={})  # 
 
 
 def argument(name: str) -> str:
-    """An argument as the user wrote it: its name, or the option of the command line that gives it."""
+    """The user's name of an argument: its own, or the corresponding option of the command line."""
     return _options.get().get(name, name)
 
 
 @contextmanager
 def options_named(options: Mapping[str, str]) -> Iterator[None]:
-    """Errors in this block name arguments by these options of the command line."""
+    """Make errors in this block name arguments by these options of the command line."""
     token = _options.set(options)
     try:
         yield
@@ -50,7 +50,7 @@ def options_named(options: Mapping[str, str]) -> Iterator[None]:
 
 
 def quoted(value: object, most: int = 60) -> str:
-    """Any value for a message: its ``repr`` on one line, cut short; what has none is named by its type."""
+    """The ``repr`` of a value on one line, abridged; its type if ``repr`` fails."""
     try:
         text = " ".join(repr(value).split())
     except Exception:  # an integer of more digits than Python prints, or a foreign __repr__ that raises
@@ -59,17 +59,17 @@ def quoted(value: object, most: int = 60) -> str:
 
 
 def invalid(error: Exception, kind: type | None = None) -> str:
-    """The fault of a value in a table of TOML: where it stands, what it has to be, and what it is.
+    """The fault of a value in a TOML table: its path, the required type, and its type.
 
-    kind: the record that the file is read as, which knows the words that a key may have.
+    kind: the record type of the file, which defines the allowed texts of a key.
     """
     text, _, path = str(error).partition(" - at `$")
     path = path.strip("`.") or "the file"
     if match := re.fullmatch(r"Expected `([^`]*)`, got `(\w+)`", text):
-        wanted = " or ".join(_TYPES.get(name, name) for name in match[1].split(" | ") if name != "null")
-        # a plan has its decimals as text
+        expected = " or ".join(_TYPES.get(name, name) for name in match[1].split(" | ") if name != "null")
+        # decimals of a plan are text
         is_number = match[2] == "str" and match[1].startswith(("int", "float"))
-        return f"{path} has to be {wanted}" + ("" if is_number else f", and is {_TYPES.get(match[2], match[2])}")
+        return f"{path} has to be {expected}" + ("" if is_number else f", and is {_TYPES.get(match[2], match[2])}")
     if match := re.fullmatch(r"Expected `([^`]*)` (?:of length )?([<>=]+) (\d+)", text):
         what = "of length " if match[1] in ("array", "str") else ""
         return f"{path} has to be {_TYPES.get(match[1], match[1])} {what}{match[2]} {match[3]}"
@@ -83,7 +83,7 @@ def invalid(error: Exception, kind: type | None = None) -> str:
 
 
 def _words(kind: Any, path: str) -> list[str]:
-    """The texts that the key at ``path`` may have in a record; none where it is not there."""
+    """The allowed texts of the key at ``path`` in a record; empty if there is no such key."""
     for key in re.findall(r"[A-Za-z_]\w*", path):
         record = next((part for part in _parts(kind) if key in getattr(part, "__annotations__", {})), None)
         kind = get_type_hints(record)[key] if record else None
@@ -91,29 +91,29 @@ def _words(kind: Any, path: str) -> list[str]:
 
 
 def _parts(kind: Any) -> list[Any]:
-    """A type and all those in it: the texts of a Literal, the entries of a list."""
+    """A type and its arguments, recursively: the texts of a Literal, the entries of a list."""
     return [kind, *(part for entry in get_args(kind) for part in _parts(entry))]
 
 
 def why(error: Exception) -> str:
-    """The reason that a file could not be read or written, without its path and the number of the error."""
+    """The reason of a failed read or write, without path and error number."""
     return getattr(error, "strerror", None) or str(error)
 
 
 def nearest(name: str, known: Iterable[str], alike: float = 0.6) -> str:
-    """The known name nearest to a misspelt one, "" where none is; alike: the ratio of difflib that it must reach."""
+    """The known name nearest to a misspelt one, or ""; alike: its least difflib ratio."""
     names = {entry.lower(): entry for entry in sorted(known)}
     return next((names[near] for near in get_close_matches(name.lower(), names, 1, alike)), "")
 
 
 def meant(name: str, known: Iterable[str], alike: float = 0.6) -> str:
-    """``Did you mean NAME? `` of the nearest name, to begin a remedy; "" where none is near."""
+    """``Did you mean NAME? `` with the nearest name, to begin a remedy; "" if none is near."""
     near = nearest(name, known, alike)
     return f"Did you mean {near}? " if near else ""
 
 
 class HeavyTopError(Exception):
-    """A request that cannot be carried out: ``cause`` says what was wrong, ``remedy`` what to do about it."""
+    """A request that cannot be carried out, with its ``cause`` and a ``remedy``."""
 
     exit_code = ExitCode.BAD_INPUT
 
@@ -124,7 +124,7 @@ class HeavyTopError(Exception):
 
 
 class ImpossibleBody(UserWarning):
-    """A body whose moments of inertia no rigid body has, though the equations have solutions."""
+    """A body with moments of inertia that no rigid body has, although the equations have solutions."""
 
 
 class InputError(HeavyTopError):
@@ -132,12 +132,12 @@ class InputError(HeavyTopError):
 
 
 class MissingExtra(InputError):
-    """A package of an extra that is not installed; names the extra and the command that installs it."""
+    """A package of an extra is not installed; names the extra and the command that installs it."""
 
 
 @contextmanager
 def prefixed(what: str) -> Iterator[None]:
-    """Says in the cause of an InputError what was read."""
+    """Prefix the cause of an InputError with what was read."""
     try:
         yield
     except InputError as error:
@@ -145,34 +145,34 @@ def prefixed(what: str) -> Iterator[None]:
 
 
 class NotInClass(InputError):
-    """A start outside the class of motions that a closed form covers; says which exact test failed and by how much."""
+    """A start outside the class of motions of a closed form; names the failed exact test and by how much it failed."""
 
 
 class NoSuchFunction(InputError):
-    """A function that a Python file does not have."""
+    """A Python file has no such function."""
 
 
 class LevelNotDone(NotInClass):
-    """A start of a class, on or beside a degenerate level that its closed form does not cover; names the level."""
+    """A start on or near a degenerate level that the closed form of its class does not cover; names the level."""
 
 
 class Contradiction(HeavyTopError):
-    """Two sources that must agree exclude each other: one of them is wrong, and nothing may rest on either."""
+    """Two sources that must agree exclude each other: one of them is wrong, and neither can be used."""
 
     exit_code = ExitCode.FINDING
 
 
 class OutOfReach(HeavyTopError):
-    """A reference that cannot be proven to the digits asked for; says how many could be reached."""
+    """A reference that cannot be proven to the requested digits; says how many can be reached."""
 
     exit_code = ExitCode.INCOMPLETE
 
 
 class PeerFailed(HeavyTopError):
-    """A third-party integrator that raised or broke its contract; says which and how.  Its row says so, others go on.
+    """A third-party integrator raised an error or broke its contract.  Its row reports this; other rows are measured.
 
-    answered: whether it kept the protocol: it said itself that it failed, gave a state that is not finite, or was still
-    at it when its time was over.
+    answered: whether it kept the protocol: it reported the failure itself, returned a state that is not finite, or
+    exceeded its time limit.
     """
 
     exit_code = ExitCode.INCOMPLETE
@@ -183,14 +183,14 @@ class PeerFailed(HeavyTopError):
 
 
 class Unsupported(InputError):
-    """A request that an integrator declares that it cannot do: a system, a format, a direction, events.  No failure."""
+    """A request beyond the declared capabilities of an integrator: a system, format, direction, events.  No failure."""
 
 
 class OutOfTime(HeavyTopError):
-    """A third-party integrator that was stopped at the time limit of its row."""
+    """A third-party integrator was stopped at the time limit of its row."""
 
     exit_code = ExitCode.INCOMPLETE
 
 
 class NotAsked(OutOfTime):
-    """A row of a third-party integrator that ran out of time in others."""
+    """A row was skipped because its third-party integrator ran out of time in others."""

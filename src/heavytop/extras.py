@@ -1,4 +1,4 @@
-"""The extras of the installation: packages that part of the program needs, and what is said where one is missing."""
+"""Optional packages of the installation, and the error if one is missing."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ EXTRAS = {
     "cluster": ("dask", "distributed"),
     "logs": ("rosbags",),
 }
-"""The modules of each extra of ``pyproject.toml`` that the program itself imports."""
+"""The modules of each extra of ``pyproject.toml`` that the program imports."""
 
 
 def has_extra(name: str) -> bool:
@@ -39,25 +39,25 @@ def extra_of(module: str) -> str:
 
 
 def missing(name: str, what: str = "This") -> MissingExtra:
-    """The error where an extra that something needs is not installed."""
+    """The error if an extra that ``what`` needs is not installed."""
     return MissingExtra(f"{what} needs the extra {name}: {install(name)}")
 
 
 def require_extra(name: str) -> None:
-    """Raises MissingExtra where a module of the extra is not installed."""
+    """Raise MissingExtra if a module of the extra is not installed."""
     if not has_extra(name):
         raise missing(name)
 
 
 alone = False
-"""Whether heyoka is loaded without the packages that it converts to and from: so in the process of a command."""
+"""Whether heyoka is imported without the packages that it converts to and from, as in the process of a command."""
 _CONVERTED = "sympy", "mpmath"
 _loading = Lock()
 
 
 @cache
 def import_heyoka() -> Any:
-    """heyoka, when it is used; where it is :data:`alone`, in a third of the time."""
+    """heyoka, imported when it is used; in a third of the time if :data:`alone`."""
     with _loading:
         hidden = [name for name in _CONVERTED if alone and not {name, "heyoka"} & sys.modules.keys()]
         sys.modules.update(dict.fromkeys(hidden))  # type: ignore[arg-type]  # as if they were not installed
@@ -69,7 +69,7 @@ def import_heyoka() -> Any:
 
 
 class Stub:
-    """Stands for a module that is not installed: its names may be written down, and nothing comes of them."""
+    """A stand-in for a module that is not installed: any attribute and any call of it is the stand-in itself."""
 
     def __getattr__(self, _: str) -> Stub:
         return self

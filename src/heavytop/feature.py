@@ -1,4 +1,4 @@
-"""The record by which a feature joins the rooms that all features share."""
+"""The record by which a feature registers its parts."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class Feature:
-    """A package of ``features/``, and what it adds: each a ``MODULE:NAME`` within the package, loaded when it is used.
+    """A package of ``features/`` and its parts, each a ``MODULE:NAME`` in the package, imported when used.
 
     kinds: its kinds of measurement, classes of :class:`heavytop.kind.Kind`.
     commands: modules that add commands to the command line when they are imported.
-    python: the names that :mod:`heavytop` has from it, by their modules.
+    python: the names that it adds to :mod:`heavytop`, by module.
     motion: options of `propagate` and `reference`, a class of :class:`heavytop.cli.motions.MotionOptions`.
     plans: built-in plans, each a file NAME.toml of the package.
     starters: a folder of the package, with adapters that `heavytop new --engine` copies.
-    explain: a function of a case, its run and the largest error of that, which says what explains the error.
+    explain: a function of a case, its run and the largest error of that, which returns an explanation of the error.
     """
 
     package: str
@@ -31,7 +31,7 @@ class Feature:
     explain: str = ""
 
     def load(self, name: str) -> Any:
-        """The module ``MODULE``, or what it calls ``NAME``."""
+        """The module ``MODULE``, or its attribute ``NAME``."""
         module, _, attribute = name.partition(":")
         part = import_module(f"{self.package}.{module}")
         return getattr(part, attribute) if attribute else part

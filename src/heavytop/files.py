@@ -1,4 +1,4 @@
-"""Files written whole or not at all, and lines that carry their checksum."""
+"""Atomic writes of files, and lines with a checksum."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from heavytop.errors import InputError, quoted
 
 
 def without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """The object of a JSON document, for ``object_pairs_hook``; raises InputError where a key stands in it twice.
+    """The object of a JSON document, for ``object_pairs_hook``; raises InputError for a repeated key.
 
-    JSON readers differ in which of the two they take.
+    JSON readers differ in which of the values they take.
     """
     table = dict(pairs)
     if len(table) < len(pairs):
@@ -28,7 +28,7 @@ def without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def read_whole(path: Path) -> bytes:
     """The content of a file.
 
-    Raises OSError, also for a device such as /dev/zero, which has no end, and for a pipe that nobody may write to.
+    Raises OSError, also for a device such as /dev/zero, which has no end, and for a pipe, which may have no writer.
     """
     if path.exists() and not path.is_file() and not path.is_dir():
         raise OSError("it is a device or a pipe, not a file")
@@ -36,20 +36,20 @@ def read_whole(path: Path) -> bytes:
 
 
 def line(content: bytes) -> bytes:
-    """``content``, which holds no line break, behind its SHA-256."""
+    """``content``, which contains no line break, after its SHA-256."""
     return hashlib.sha256(content).hexdigest().encode() + b" " + content + b"\n"
 
 
 def verified(signed: bytes) -> bytes | None:
-    """The content of a line without its line break; None where it was damaged."""
+    """The content of a line without line break; None if its checksum is wrong."""
     digest, _, content = signed.partition(b" ")
     return content if hashlib.sha256(content).hexdigest().encode() == digest else None
 
 
 def replace(path: Path, content: bytes | Iterable[bytes]) -> str:
-    """Write a file whole or not at all, or piece by piece; returns its SHA-256.
+    """Write a file atomically, from one piece or several; returns its SHA-256.
 
-    Raises InputError where it cannot be written; then nothing is left behind.
+    Raises InputError if it cannot be written; then no partial file remains.
     """
     digest = hashlib.sha256()
     with atomic_write(path) as file:
@@ -60,21 +60,18 @@ def replace(path: Path, content: bytes | Iterable[bytes]) -> str:
 
 
 def replace_all(contents: Sequence[tuple[Path, bytes]]) -> None:
-    """Write several files, all of them or none.
-
-    Raises InputError where one cannot be written.
-    """
+    """Write several files, all of them or none; raises InputError if one cannot be written."""
     with ExitStack() as stack:
         for path, content in contents:
             file = stack.enter_context(atomic_write(path))
             file.write(content)
-            # what a full disk refuses is known before the first file takes its name
+            # a full disk is detected before the first file gets its name
             file.flush()
             os.fsync(file.fileno())
 
 
 def cache_folder(name: str) -> Path:
-    """Where this user keeps what the program would work out again; no folder can be there for one without a home."""
+    """The cache folder of this user; a path that cannot exist for a user without a home."""
     home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
     with suppress(RuntimeError):
         return (Path(home) if home else Path.home() / ".cache") / "heavytop" / name
@@ -83,9 +80,9 @@ def cache_folder(name: str) -> Path:
 
 @contextmanager
 def atomic_write(path: Path) -> Iterator[BinaryIO]:
-    """A file that takes the name ``path`` when all of it is written, and leaves nothing behind where that fails.
+    """A file that is renamed to ``path`` once it is complete; no partial file remains after a failure.
 
-    Raises InputError where it cannot be written.
+    Raises InputError if it cannot be written.
     """
     if path.exists() and not path.is_file():
         what = "folder" if path.is_dir() else "device or a pipe"

@@ -1,4 +1,4 @@
-"""A guard kills what a program or an integrator started, once this process has ended or is done with it."""
+"""Guards, which kill all processes of a program or an integrator when this process ends or is done with it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from time import perf_counter
 from uuid import uuid4
 
 MARK = "HEAVYTOP_GUARD"
-"""The variable of the environment by which a guard finds what left its process group."""
+"""The environment variable by which a guard finds processes that left its group."""
 _KILL_ALL = f"""read -r _
 for file in $(grep -ls "{MARK}=$1" /proc/[0-9]*/environ); do
   process=${{file#/proc/}}
@@ -22,46 +22,45 @@ done
 kill -KILL 0"""
 """The script of a guard's shell once its input has ended."""
 _ROUNDS = 20
-"""How often what a process may just have started is looked for."""
+"""The number of searches for processes that may just have been started."""
 
 
 def processors() -> int:
-    """How many processors this process may use, where the platform tells; else how many there are."""
+    """The number of processors that this process may use; of all processors if the platform does not tell."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def how_it_ended(code: int) -> str:
-    """``by SIGSEGV`` or ``with exit code 1``, of the exit code that Python gives of a process."""
+    """``by SIGSEGV`` or ``with exit code 1``, from the exit code of a process in Python."""
     if code >= 0:
         return f"with exit code {code}"
     try:
         return f"by {signal.Signals(-code).name}"
-    except ValueError:  # a signal of real time has no name
+    except ValueError:  # a real-time signal has no name
         return f"by signal {-code}"
 
 
 class Guard:
-    """A small process that kills its process group once this process has ended, however that came about.
+    """A small process that kills its process group once this process has ended, for whatever reason.
 
-    What is started with :attr:`environment` is killed too where it has left the group, as a program does that calls
-    ``setsid`` or becomes a daemon: what a process starts inherits its environment.  That takes a Linux /proc; elsewhere
-    the group alone is killed.
+    Processes started with :attr:`environment`, which their children inherit, are killed even if they left the group, as
+    daemons and programs that call ``setsid`` do.  This needs /proc of Linux; elsewhere only the group is killed.
 
-    group: the process group that it joins; a new one where that is 0.  mark: of :class:`ChildContext`; else a new one.
+    group: the process group that it joins; 0 for a new one.  mark: of :class:`ChildContext`; empty for a new one.
     """
 
     def __init__(self, group: int = 0, mark: str = "") -> None:
         self._mark = mark or uuid4().hex
         reading, self._lifeline = os.pipe()
         try:
-            # what it reads ends with this process, which alone holds the other end
+            # its input ends with this process, which alone holds the other end
             self._shell = subprocess.Popen(
                 ["/bin/sh", "-c", _KILL_ALL, "sh", self._mark],
                 stdin=reading,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
                 process_group=group,
-                # a guard inside what another guards is to do its work when that is killed
+                # a guard in a guarded process must survive when that is killed
                 env={name: value for name, value in os.environ.items() if name != MARK},
             )
         except BaseException:
@@ -73,11 +72,11 @@ class Guard:
 
     @property
     def environment(self) -> dict[str, str]:
-        """The variable that marks a process, and all that it starts, as this guard's."""
+        """The variable that marks a process and its descendants as guarded by this one."""
         return {MARK: self._mark}
 
     def end(self) -> None:
-        """Kills every process of the group, the guard too, and those that left it."""
+        """Kill every process of the group, the guard too, and those that left it."""
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(self.group, signal.SIGKILL)
         kill_marked(self._mark)
@@ -87,32 +86,32 @@ class Guard:
 
 
 def kill_marked(mark: str) -> None:
-    """Kills every process that has this mark, also where it has left its group or lost its parent."""
+    """Kill every process with this mark, even if it has left its group or lost its parent."""
     for _ in range(_ROUNDS):
-        if not (left := _marked(mark)):
+        if not (remaining := _marked(mark)):
             break
-        for process in left:
+        for process in remaining:
             with suppress(ProcessLookupError, PermissionError):
                 os.kill(process, signal.SIGKILL)
 
 
 def _marked(mark: str) -> list[int]:
-    """The processes whose environment has this mark; none where the system does not show environments."""
-    processes, wanted = [], f"{MARK}={mark}".encode()
+    """The processes with this mark in their environment; empty if the system does not show environments."""
+    processes, entry = [], f"{MARK}={mark}".encode()
     for file in glob("/proc/[0-9]*/environ"):
         with suppress(OSError):  # it has ended, or is somebody else's; that of a zombie is empty
-            if wanted in Path(file).read_bytes():
+            if entry in Path(file).read_bytes():
                 processes.append(int(file.split("/")[2]))
     return processes
 
 
 def stopwatch(process: int | None = None, *, with_children: bool = False) -> Callable[..., float]:
-    """Starts a clock: the seconds since then, less those that a process, or this thread, was ready to run and had no
-    processor, as far as the system counts them, which Linux does, and less seconds that are given.
+    """Start a clock; the function returned gives the seconds since then, minus those in which a process, or this
+    thread, was ready to run without a processor (counted on Linux), and minus its argument.
 
-    What the process computed remains at least.
+    The result is at least the time that the process has computed.
 
-    with_children: less those of the processes that it started, too, for which it waits.
+    with_children: whether the waiting time of its child processes is subtracted too.
     """
 
     def counted() -> tuple[float, float]:
@@ -131,12 +130,12 @@ def stopwatch(process: int | None = None, *, with_children: bool = False) -> Cal
 
 
 def waited_for_processor() -> float:
-    """Seconds for which this thread was ready to run and had no processor; 0 where nobody counts them."""
+    """Seconds in which this thread was ready to run without a processor; 0 if the system does not count them."""
     return _scheduled("thread-self")[1]
 
 
 def _scheduled(process: str) -> tuple[float, float]:
-    """Seconds for which a process, or its first thread, ran, and was ready and had no processor; 0 if not counted."""
+    """Seconds in which the first thread of a process ran, and was ready without a processor; 0 if not counted."""
     running, waiting = map(int, [*_read(f"/proc/{process}/schedstat").split(), "0", "0"][:2])
     return running / 1e9, waiting / 1e9
 

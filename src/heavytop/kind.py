@@ -15,9 +15,9 @@ from heavytop.report.document import kind as reported
 
 
 class Kind(run.MeasuredKind, reported.ReportedKind):
-    """A kind of measurement: run and reported as the classes above it say.
+    """A kind of measurement, with the defaults of its two base classes.
 
-    A subclass names itself, gives its ``table`` and ``measure``, and what of the rest is not the usual.
+    A subclass defines its ``name``, ``table`` and ``measure``, and overrides other defaults as needed.
     """
 
     def measure(self, task: Task, saved: Saved) -> Row:
@@ -25,17 +25,17 @@ class Kind(run.MeasuredKind, reported.ReportedKind):
         raise NotImplementedError
 
 
-# What explains the states of a third-party integrator that are far off: a sign, a step too many, a row too late.
+# Explanations of large errors of a third-party integrator, such as a wrong sign, an additional step, a shifted row.
 
 
 FAR = 1e-2
-"""Smaller errors, relative to max(1, |value|), are those of a method."""
+"""Smaller errors, relative to max(1, |value|), are taken for errors of a method."""
 
 
 def with_explanation(row: Row, task: Task, run: Trajectory, scorer: Scorer) -> Row:
-    """The row with the first mistake that explains its states, where the integrator is not heavytop's own.
+    """The row with the first mistake that explains its states, if the integrator is a third-party one.
 
-    Only of runs that reached their end, and whose error is known: each mistake is tried with runs of heyoka.
+    Only for complete runs with a known error: each mistake is simulated with heyoka.
     """
     if task.integrator.own or run.outcome is not Outcome.SUCCESS or not len(run.states) or scorer.error is None:
         return row

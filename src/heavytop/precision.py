@@ -1,7 +1,7 @@
-"""Number formats, and the wall where exact numbers are rounded into them.
+"""Number formats, and conversions between exact numbers and numbers of a format.
 
-Everything inside the program is a :class:`fractions.Fraction`.  Rounding to a format happens here and only here
-(:func:`number`), and what was rounded can be had back exactly (:func:`exact`).
+Numbers inside the program are of :class:`fractions.Fraction`.  They are rounded to a format only here, by
+:func:`number`; :func:`exact` returns the exact value of a rounded number.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ if TYPE_CHECKING:
 REAL_BITS = range(24, 20001)
 _MAX_TEXT = 100_000
 LARGEST = Fraction(10) ** 150
-"""Beyond this, physical data overflow in some float on the way; a change of units brings them back."""
+"""Larger physical data overflow in some float of the program; other units avoid this."""
 _LARGE_POWER = 498
-"""Numbers below 2^498 are not beyond it."""
+"""2^498 is below :data:`LARGEST`."""
 _DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
 _REMEDY = "Write an integer, a decimal such as 0.25 or 1e-3, or a fraction such as -2/5."
 
 
 Given: TypeAlias = int | float | str | Fraction | Decimal | SupportsIndex
-"""A number as users give it: an integer, a float of any format (the exact binary number it is), or exact text."""
+"""A number as an argument: an integer, a float of any format (taken as the exact binary number), or exact text."""
 Array: TypeAlias = "NDArray[Any]"
 """An array of the numbers of a format, whatever their dtype."""
 
@@ -57,7 +57,7 @@ class Precision:
 
     @property
     def digits(self) -> int:
-        """Significant decimal digits that name a number of this format uniquely."""
+        """Significant decimal digits that determine a number of this format."""
         return 1 + math.ceil(self.bits * math.log10(2))
 
     @property
@@ -69,7 +69,7 @@ class Precision:
 DOUBLE = Precision("double", 53)
 EXTENDED = Precision("extended", 64)
 DOUBLE_DOUBLE = Precision("double-double", 106)
-"""The sum of two doubles; its numbers are returned as heyoka's real of 106 bits.  Of ``multiword`` alone."""
+"""The sum of two doubles; its numbers are returned as heyoka's real of 106 bits.  Only ``multiword`` has it."""
 QUAD = Precision("quad", 113)
 FORMATS = DOUBLE, EXTENDED, DOUBLE_DOUBLE, QUAD
 
@@ -83,7 +83,7 @@ def real(bits: int) -> Precision:
 
 
 def parse(name: str) -> Precision:
-    """The format of that name; raises InputError unless it is that of one of FORMATS or ``real:BITS``."""
+    """The format of that name; raises InputError unless it is one of FORMATS or ``real:BITS``."""
     if isinstance(name, str):
         for precision in FORMATS:
             if name == precision.name:
@@ -97,7 +97,7 @@ def parse(name: str) -> Precision:
 
 
 def as_integer(value: Any, what: str) -> int:
-    """``value`` as an integer; raises InputError for a bool, for a float even if it is whole, and for anything else."""
+    """``value`` as an integer; raises InputError for bools, floats (even integral ones) and anything else."""
     try:
         if type(value).__name__ != "bool":  # Python's or numpy's
             return index(value)
@@ -107,7 +107,7 @@ def as_integer(value: Any, what: str) -> int:
 
 
 def available() -> dict[str, str | None]:
-    """For each family of formats: None if this platform has it, else the reason why not."""
+    """For each family of formats None if this platform has it, else the reason why not."""
     heyoka = import_heyoka()
     import numpy
 
@@ -147,8 +147,8 @@ def usable_tolerance(value: Given, precision: Precision) -> Fraction:
 def exact(value: Any) -> Fraction:
     """The exact value of an int, Fraction, Decimal, decimal or fraction string, or binary float of any format.
 
-    A float is the exact binary number it is, not the decimal that it prints as.  Raises InputError for text that is
-    no number, for bools, NaN and infinities, and for text beyond 100,000 characters or an exponent beyond that size.
+    The value of a float is that of its binary representation, not of its printed decimal.  Raises InputError for text
+    that is not a number, for bools, NaN and infinities, and for too long text or exponents.
     """
     if type(value) is Fraction and type(value.numerator) is int is type(value.denominator):
         return value
@@ -163,7 +163,7 @@ def exact(value: Any) -> Fraction:
         return _from_quad(value) if kind == "real128" else round_to(_from_text(str(value)), int(value.prec))
     if isinstance(value, Decimal) and value.is_finite() and abs(value.adjusted()) > _MAX_TEXT:
         raise _too_large(value)
-    # numpy.bool and bool are integers to Python, and no numbers to anyone
+    # Python treats bool and numpy.bool as integers
     if kind != "bool":
         try:
             if isinstance(value, Rational):
@@ -171,7 +171,7 @@ def exact(value: Any) -> Fraction:
             if hasattr(value, "as_integer_ratio"):
                 return Fraction(*map(int, value.as_integer_ratio()))
             return Fraction(index(value))
-        except Exception:  # NaN, infinities, and whatever a foreign number does
+        except Exception:  # NaN, infinities, and errors of a foreign number type
             pass
     if kind == "mpf":
         return _from_mantissa(value)
@@ -222,9 +222,9 @@ def _too_large(value: object) -> InputError:
 
 
 def shown(value: Fraction) -> str:
-    """An exact number for a message: as it is where that is short, else to six digits."""
+    """An exact number for a message: exact if that is short, else to six digits."""
     short = max(value.numerator.bit_length(), value.denominator.bit_length()) < 100
-    # rounded first: a fraction of a million digits takes seconds to write, in however few of them
+    # rounded first: converting a fraction of a million digits to decimal takes seconds
     return str(value) if short else decimal_text(round_to(value, 64), 6)
 
 
@@ -234,13 +234,13 @@ def six_digits(value: Fraction) -> str:
 
 
 def plain_decimal(value: Fraction, digits: int) -> str:
-    """A decimal of at most so many digits, without trailing zeros."""
+    """A decimal of at most ``digits`` digits, without trailing zeros."""
     text = decimal_text(value, digits)
     return text.rstrip("0").rstrip(".") if "." in text and "E" not in text else text
 
 
 def time_text(time: Fraction) -> str:
-    """A time in reports: exact where 20 digits suffice, else 20 digits."""
+    """A time in reports: exact if 20 digits suffice, else rounded to 20."""
     text = decimal_text(time, 20)
     if abs(time) >= 10**15:
         return text
@@ -249,19 +249,19 @@ def time_text(time: Fraction) -> str:
 
 
 def exact_text(value: Fraction) -> str:
-    """An exact number as ``str`` writes it; Python refuses to write integers of more than 4300 digits itself."""
+    """An exact number as ``str`` prints it, without Python's limit of 4300 digits."""
     numerator, denominator = Decimal(value.numerator), Decimal(value.denominator)
     return f"{numerator}" if denominator == 1 else f"{numerator}/{denominator}"
 
 
 def physical(number: Any, what: str) -> Fraction:
-    """The exact value; raises InputError, which names it, for what is not a number and for more than 10^150."""
+    """The exact value; raises InputError unless it is a number up to 10^150.  what: its name, for the error."""
     try:
         value = exact(number)
     except InputError as error:
         raise InputError(f"{argument(what)}: {error.cause}", error.remedy) from None
-    apart = value.numerator.bit_length() - value.denominator.bit_length()
-    if apart >= _LARGE_POWER and abs(value) > LARGEST:
+    exponent = value.numerator.bit_length() - value.denominator.bit_length()
+    if exponent >= _LARGE_POWER and abs(value) > LARGEST:
         raise InputError(
             f"{argument(what)} = {shown(value)} is too large.", "Choose other units: numbers go up to 1e150."
         )
@@ -281,7 +281,7 @@ def _from_text(text: str) -> Fraction:
 
 _SHORT = 64
 _from_short_text = lru_cache(maxsize=4096)(_from_text)
-"""Scripts call with the same text again and again, as times or as data."""
+"""Scripts repeat texts, as times or as data."""
 
 
 def _from_decimal(text: str, original: str) -> Fraction:
@@ -307,7 +307,7 @@ def round_to(value: Fraction, bits: int) -> Fraction:
 
 
 def _significand(value: Fraction, bits: int) -> tuple[int, int]:
-    """Integers (m, e) with m 2^e the nearest to ``value`` that has ``bits`` bits."""
+    """Integers (m, e) with m of ``bits`` bits and m 2^e nearest to ``value``."""
     exponent = value.numerator.bit_length() - value.denominator.bit_length() - bits
     significand = _nearest(value, exponent)
     if abs(significand) >= 1 << bits:
@@ -319,15 +319,15 @@ def _significand(value: Fraction, bits: int) -> tuple[int, int]:
 def _nearest(value: Fraction, exponent: int) -> int:
     """value/2^exponent rounded to the nearest integer, ties to even."""
     above, below = value.numerator << max(0, -exponent), value.denominator << max(0, exponent)
-    quotient, rest = divmod(above, below)
-    return quotient + (2 * rest > below or (2 * rest == below and quotient % 2))
+    quotient, remainder = divmod(above, below)
+    return quotient + (2 * remainder > below or (2 * remainder == below and quotient % 2))
 
 
 def number(value: Fraction, precision: Precision) -> Any:
-    """``value`` rounded to nearest in ``precision``, as that format's own number type.
+    """``value`` rounded to nearest in ``precision``, as a number of the type of that format.
 
     double: numpy.float64; extended: numpy.longdouble; quad: heyoka.real128; real, double-double: heyoka.real.
-    Raises InputError where the value lies outside the format's exponent range.
+    Raises InputError if the value is outside of the exponent range of the format.
     """
     import numpy
 
@@ -340,7 +340,7 @@ def number(value: Fraction, precision: Precision) -> Any:
 
 
 def _nearest_double(value: Fraction) -> float:
-    """``value`` rounded to nearest; raises InputError outside the exponents of doubles."""
+    """The double nearest to ``value``; raises InputError outside of the exponent range."""
     try:
         result = float(value)
     except OverflowError:
@@ -358,9 +358,9 @@ def _out_of_range(value: Fraction, precision: Precision) -> InputError:
 
 
 def numbers(values: Sequence[Fraction], precision: Precision) -> Sequence[Any]:
-    """:func:`number` of each, an array where whole arrays of doubles show them; InputError as there.
+    """:func:`number` of each; an array if the values have attached doubles.  Raises InputError as there.
 
-    values: may have ``doubles``, the nearest to each, and say that they ``are_doubles`` themselves.
+    values: may have attributes ``doubles``, the nearest ones, and ``are_doubles``, whether all values equal them.
     """
     nearest = getattr(values, "doubles", None)
     if nearest is None or not len(nearest):
@@ -378,7 +378,7 @@ def numbers(values: Sequence[Fraction], precision: Precision) -> Sequence[Any]:
 
 
 def _widened(doubles: Array, precision: Precision) -> Any:
-    """An array of doubles as numbers of a format with as many bits or more."""
+    """An array of doubles as numbers of a format with at least as many bits."""
     if precision.family == "extended":
         return doubles.astype("longdouble")
     heyoka = import_heyoka()
@@ -387,14 +387,14 @@ def _widened(doubles: Array, precision: Precision) -> Any:
 
 
 def _long_doubles(values: Sequence[Fraction], doubles: Array) -> Any:
-    """The nearest to each of ``values`` in extended, out of the nearest double and the nearest to what that lacks."""
+    """``values`` rounded to extended, as the nearest double plus the double nearest to the remainder."""
     import numpy
 
     lows = numpy.array([_rest(*pair) for pair in zip(values, doubles.tolist(), strict=True)])
     highs = doubles.astype(numpy.longdouble)
     sums = highs + lows
     error = lows - (sums - highs)
-    for k in map(int, numpy.flatnonzero(sums + error * (1 + 2.0**-38) != sums)):  # about as near to two of them
+    for k in map(int, numpy.flatnonzero(sums + error * (1 + 2.0**-38) != sums)):  # nearly a tie
         sums[k] = number(values[k], EXTENDED)
     return sums
 
@@ -420,7 +420,7 @@ def _wide(significand: int, exponent: int, precision: Precision) -> Any:
 
 
 def _integer_and_exponent(significand: int, exponent: int) -> str:
-    """m 2^e as decimal text without a decimal point, which the locale could change the meaning of."""
+    """m 2^e as decimal text without a decimal point, whose meaning depends on the locale."""
     if exponent >= 0:
         return str(Decimal(significand << exponent))
     return f"{Decimal(significand * 5**-exponent)}e{exponent}"
@@ -437,12 +437,12 @@ def decimal_text(value: Fraction, digits: int) -> str:
 
 
 def quotient_text(value: Fraction, digits: int, rounding: str) -> str:
-    """``value`` as decimal text with ``digits`` significant digits, rounded as asked, a constant of ``decimal``."""
+    """``value`` as decimal text with ``digits`` significant digits, with a rounding mode of ``decimal``."""
     return ratio_text(value.numerator, value.denominator, digits, rounding)
 
 
 def ratio_text(above: int, below: int, digits: int, rounding: str) -> str:
-    """:func:`quotient_text` of above/below, which may have common factors: a large greatest one takes long to find."""
+    """:func:`quotient_text` of above/below, which need not be coprime: a large common factor takes long to find."""
     context = _context(digits, rounding)
     quotient = context.divide(Decimal(above), Decimal(below))
     return context.to_sci_string(quotient) if quotient else "0"
@@ -450,7 +450,7 @@ def ratio_text(above: int, below: int, digits: int, rounding: str) -> str:
 
 @lru_cache(maxsize=64)
 def _context(digits: int, rounding: str) -> Context:
-    """Nothing is left to decimal.DefaultContext, which is one for the whole process; flags are not looked at."""
+    """A context independent of decimal.DefaultContext, which is shared by the process; its flags are not used."""
     return Context(digits, rounding, Emin=MIN_EMIN, Emax=MAX_EMAX, capitals=1, clamp=0, flags=[], traps=[Overflow])
 
 
@@ -463,13 +463,13 @@ def log10(value: Fraction) -> float | None:
 
 
 def native(text: str, precision: Precision) -> Any:
-    """The number of ``precision`` that :func:`native_text` named; a zero keeps its sign in "-0"."""
+    """The number of ``precision`` from :func:`native_text`; "-0" is the negative zero."""
     value = number(exact(text), precision)
     return -value if value == 0 and text.startswith("-") else value
 
 
 def native_text(value: Any, precision: Precision) -> str:
-    """A number of ``precision`` as decimal text that names it uniquely; ``nan``, ``inf`` or ``-inf`` where it is."""
+    """Decimal text that determines a number of ``precision``, or ``nan``, ``inf`` or ``-inf``."""
     import numpy
 
     if not numpy.isfinite(value):
@@ -485,14 +485,14 @@ Result = TypeVar("Result")
 
 
 def cache_last_call(function: Callable[P, Result]) -> Callable[P, Result]:
-    """``function`` of immutable arguments, called again only where one of them is another object.
+    """``function`` of immutable arguments, with a cache of its last result, valid for identical argument objects.
 
-    A call with keywords is not cached, nor is an exception.  Threads may call it: at worst each computes for itself.
+    Calls with keywords and exceptions are not cached.  Thread-safe: at worst each thread computes the result.
     """
     cached: tuple[tuple[Any, ...], Any] | None = None
 
     @wraps(function)
-    def look_up(*arguments: P.args, **named: P.kwargs) -> Result:
+    def cached_function(*arguments: P.args, **named: P.kwargs) -> Result:
         nonlocal cached
         if named:
             return function(*arguments, **named)
@@ -504,13 +504,13 @@ def cache_last_call(function: Callable[P, Result]) -> Callable[P, Result]:
         cached = arguments, value
         return value
 
-    return look_up
+    return cached_function
 
 
 class OncePerArguments(Generic[Result]):
-    """A function that is called once for equal arguments: a thread waits for the result that another computes.
+    """A function that is called once for equal arguments; other threads wait for the result.
 
-    results: by the arguments.  An exception is not cached.
+    results: by the arguments.  Exceptions are not cached.
     """
 
     def __init__(self, function: Callable[..., Result]) -> None:
@@ -530,7 +530,7 @@ class OncePerArguments(Generic[Result]):
 
 
 class Ring(Protocol):
-    """A number as far as the algebra of tops goes: Fraction, float, ball, array, expression of heyoka, or sympy's."""
+    """The arithmetic of the algebra of tops: of Fraction, float, ball, array, and expressions of heyoka and sympy."""
 
     def __add__(self, other: Self, /) -> Self: ...
     def __sub__(self, other: Self, /) -> Self: ...
@@ -540,7 +540,7 @@ class Ring(Protocol):
 
 
 class OrderedRing(Ring, Protocol):
-    """Real numbers: those that are near some float."""
+    """Real numbers, which can be approximated by a float."""
 
     def __sub__(self, other: Self | int, /) -> Self: ...
     def __truediv__(self, other: Self | int, /) -> Self: ...
@@ -552,15 +552,15 @@ class OrderedRing(Ring, Protocol):
 
 
 Scalar = TypeVar("Scalar", bound=Ring)
-"""Numbers of one ring, those of the arguments and of what is returned."""
+"""The ring of the arguments and the result."""
 Real = TypeVar("Real", bound=OrderedRing)
 Vector = tuple[Fraction, Fraction, Fraction]
 MOST_MEMBERS = 10_000_000
-"""Members of a list; a generator may have no end."""
+"""The most members of a list; a generator may be infinite."""
 
 
 def vector(values: Iterable[Any], what: str) -> Vector:
-    """Three exact rationals out of anything :func:`heavytop.precision.exact` reads; raises InputError otherwise."""
+    """Three exact rationals of components that :func:`exact` reads; raises InputError otherwise."""
     parts = ordered(values, what, "Give three numbers, one for each principal axis: x,y,z.")
     if len(parts) != 3:
         raise InputError(
@@ -602,7 +602,7 @@ def cross(a: Sequence[Scalar], b: Sequence[Scalar]) -> tuple[Scalar, Scalar, Sca
 
 
 def rational_root(square: Fraction) -> Fraction | None:
-    """The root of the square of a rational number; None for any other number."""
+    """√square if that is rational, else None."""
     if square < 0:
         return None
     root = Fraction(isqrt(square.numerator), isqrt(square.denominator))

@@ -1,7 +1,7 @@
-"""Child processes that do not import the caller's script, and that end with this process.
+"""Child processes that do not import the caller's script, and end with this process.
 
-``multiprocessing`` imports the main script again in every child that it spawns, so a script without a main guard would
-start over in each of them.  The children of this program need nothing of the script: what they run is imported by name.
+``multiprocessing`` imports the main script in every spawned child, so a script without a main guard would run again in
+each.  The children of this program do not need the script: they import their functions by name.
 """
 
 from __future__ import annotations
@@ -30,27 +30,27 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 SAFE_PATH = "PYTHONSAFEPATH"
-"""Python's own: a file such as random.py in the working directory is not taken for a module."""
+"""Variable of Python: a file such as random.py in the working directory does not shadow a module."""
 _POLL = 0.005
 _LAST_SECONDS = 5.0
-"""That a process has to end once it has closed its pipe."""
+"""Seconds that a process has to end after it has closed its pipe."""
 _starting = Lock()
 
 
 class _Child(LokyProcess):  # type: ignore[misc]  # loky has no types
-    """A process that is started with :data:`SAFE_PATH`, and runs without it where this process has none.
+    """A process that is started with :data:`SAFE_PATH`, which is removed in it unless this process has it.
 
-    It ends with its parent, however that ends, so that a daemon of multiprocessing may start one, such as the worker of
-    Dask.
+    It ends with its parent, for whatever reason that ends, so that daemons of multiprocessing, such as workers of Dask,
+    may start one.
 
-    parent: the end of a pipe whose other end the parent alone holds.
+    parent: an end of a pipe whose other end is open in the parent alone.
     """
 
     parent: Connection
     own_path = False
 
     def run(self) -> None:
-        """In the process: what it starts in turn finds modules as usual."""
+        """Run in the process; its own child processes find modules as usual."""
         Thread(target=_end_with, args=(self.parent,), daemon=True).start()
         if self.own_path:
             os.environ.pop(SAFE_PATH, None)
@@ -66,7 +66,7 @@ class _Child(LokyProcess):  # type: ignore[misc]  # loky has no types
                 here.daemon = daemon
 
     def kill(self) -> None:
-        """At once, where the system can; nothing where it has ended."""
+        """Kill the process unless it has ended."""
         if self.pid is not None and self.exitcode is None:
             with suppress(ProcessLookupError, PermissionError):
                 os.kill(self.pid, getattr(signal, "SIGKILL", signal.SIGTERM))
@@ -74,10 +74,10 @@ class _Child(LokyProcess):  # type: ignore[misc]  # loky has no types
 
 @contextmanager
 def _environment_of_trackers() -> Iterator[None]:
-    """Lets processes started meanwhile begin with :data:`SAFE_PATH`, silent on what a signal left to clean up."""
-    wanted = {SAFE_PATH: os.environ.get(SAFE_PATH, "1"), "PYTHONWARNINGS": "ignore"}
-    before = {name: os.environ.get(name) for name in wanted}
-    os.environ.update(wanted)
+    """Start processes with :data:`SAFE_PATH`, and without warnings of resources that a signal has left."""
+    variables = {SAFE_PATH: os.environ.get(SAFE_PATH, "1"), "PYTHONWARNINGS": "ignore"}
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
     try:
         yield
     finally:
@@ -89,15 +89,15 @@ def _environment_of_trackers() -> Iterator[None]:
 
 
 def _end_with(parent: Connection) -> None:
-    parent.poll(None)  # nothing is ever sent: it has an end
+    parent.poll(None)  # returns at the end of the pipe: nothing is sent
     os._exit(1)
 
 
 class ChildContext(LokyContext):  # type: ignore[misc]
-    """In the place of ``multiprocessing.get_context("spawn")``: a forked child would share the state of heyoka's
+    """A replacement of ``multiprocessing.get_context("spawn")``: a forked child would share the state of heyoka's
     compiler and threads, a spawned one would import the caller's script.
 
-    mark: what the environment of its processes holds, for :func:`kill_marked`; nothing where that is empty.
+    mark: in the environment of its processes, for :func:`kill_marked`; empty for none.
     """
 
     def __init__(self, mark: str = "") -> None:
@@ -114,11 +114,11 @@ class ChildContext(LokyContext):  # type: ignore[misc]
             loky_tracker.ensure_running()
 
     def SimpleQueue(self) -> SimpleQueue[Any]:  # noqa: N802
-        """Python's own: that of loky needs more modules, which an integrator may have torn down."""
+        """The queue of Python: that of loky needs more modules, which an integrator may have broken."""
         return SimpleQueue(ctx=self)
 
     def Process(self, *arguments: Any, **options: Any) -> _Child:  # noqa: N802 - the name in multiprocessing
-        """A process that is not yet started."""
+        """A new process, not yet started."""
         marked = {MARK: self.mark} if self.mark else {}
         child = _Child(*arguments, **options, env={SAFE_PATH: os.environ.get(SAFE_PATH, "1"), **marked})
         child.parent = self._parent
@@ -128,22 +128,22 @@ class ChildContext(LokyContext):  # type: ignore[misc]
 
     @property
     def ending(self) -> str:
-        """How its last process ended by itself; empty where the system does not say."""
+        """How the last process ended by itself; empty if unknown."""
         child = self._children[-1]
         if child.pid is None:
             return ""
-        given_up = monotonic() + _LAST_SECONDS
-        while child.exitcode is None and monotonic() < given_up:  # the thread of the pool may know first
+        deadline = monotonic() + _LAST_SECONDS
+        while child.exitcode is None and monotonic() < deadline:  # the thread of the pool may notice it first
             sleep(_POLL)
         return "" if child.exitcode is None else how_it_ended(child.exitcode)
 
     def kill(self) -> None:
-        """Kills its processes."""
+        """Kill its processes."""
         for child in self._children:
             child.kill()
 
     def kill_groups(self) -> None:
-        """Kills the process groups that its processes lead."""
+        """Kill the process groups of its processes."""
         for child in self._children:
             if child.pid is not None:
                 with suppress(ProcessLookupError, PermissionError):
@@ -158,9 +158,9 @@ def _lead_group(initializer: Callable[..., object] | None, initargs: tuple[Any, 
 
 
 class GuardedProcess:
-    """A process for one call at a time, the leader of a process group; it ends with whatever it started.
+    """A process for one call at a time, the leader of a process group; it ends with all its descendants.
 
-    initializer: called in it first with ``initargs``, in its group.
+    initializer: called first in the process with ``initargs``, in its group.
     """
 
     def __init__(self, initializer: Callable[..., object] | None = None, initargs: tuple[Any, ...] = ()) -> None:
@@ -171,27 +171,27 @@ class GuardedProcess:
         self._guard: Guard | None = None
 
     def submit(self, call: Callable[P, T], *arguments: P.args, **options: P.kwargs) -> Future[T]:
-        """The call, in the process.  Raises BrokenProcessPool where it died before."""
+        """Run a call in the process; raises BrokenProcessPool if the process has died."""
         return self._pool.submit(call, *arguments, **options)
 
     def guard(self, process: int) -> None:
-        """The process, by its number, is there: from now on it ends with this one, however that ends."""
+        """Make the process, given by its id, end with this one, for whatever reason that ends."""
         with suppress(OSError):
             self._guard = Guard(process, self._context.mark)
 
     @property
     def ending(self) -> str:
-        """How the process ended by itself; empty where the system does not say."""
+        """How the process ended by itself; empty if unknown."""
         return self._context.ending
 
     def kill(self) -> None:
-        """Kills the process; what it started lives until :meth:`end`."""
+        """Kill the process; its descendants live until :meth:`end`."""
         self._context.kill()
 
     def end(self) -> None:
-        """Kills the process and whatever it started, however that left it.
+        """Kill the process and all its descendants.
 
-        Only then the threads of its pool end: they wait for pipes that a forked process holds too.
+        Only then do the threads of its pool end: they wait for pipes that forked processes hold open too.
         """
         self._context.kill_groups()
         if self._guard is not None:

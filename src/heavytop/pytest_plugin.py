@@ -1,6 +1,6 @@
-"""The pytest fixture ``heavytop_gate``: an integrator, or its states, gated on the digits that are right.
+"""The pytest fixture ``heavytop_gate``, which measures the digits right of an integrator, or of its states.
 
-pytest imports this module in every session where heavytop is installed; heavytop itself is loaded when a test uses it.
+pytest imports this module in every session if heavytop is installed; heavytop itself is imported when a test uses it.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ _COMPARISONS = ("<", "<=", "==", "!=", ">", ">=")
 
 
 class DigitsRight(float):
-    """Digits right at every sample; nan, which no comparison holds for, where that is not known.
+    """Digits right at every sample; if unknown nan, for which every comparison fails.
 
-    explanation: what a failed assertion says beside the number, a line each.
+    explanation: lines for the message of a failed assertion.
     """
 
     explanation: tuple[str, ...] = ()
@@ -29,7 +29,7 @@ class DigitsRight(float):
 class Gated:
     """The result of ``heavytop_gate``.  score: as :func:`heavytop.score` returns it.
 
-    digits_right: a number, or nan where the run did not reach its last time or lacks a reference.
+    digits_right: a number, or nan if the run did not reach its last time or has no reference.
     """
 
     def __init__(self, score: Score) -> None:
@@ -59,19 +59,19 @@ def gate(
     precision: str = "double",
     **options: Any,
 ) -> Gated:
-    """How many digits an integrator keeps on a built-in case, or states that some program computed have.
+    """The digits right of an integrator on a built-in case, or of states computed by any program.
 
     Arguments:
         integrator_or_states: a name of `heavytop list`, "mine.toml", "./mine.py:solve", a callable, a Trajectory, or
             states of shape (n, 6) in the order Ω1 Ω2 Ω3 γ1 γ2 γ3 at ``times``.
         case: a name of `heavytop list`.
-        times: exact numbers, strictly monotone away from 0; None for 1, 2, ..., 10, with states necessary.
+        times: exact numbers, strictly monotone away from 0; None for 1, 2, ..., 10; required with states.
         precision: the format.
         options: of :func:`heavytop.propagate`, such as ``tolerance``.
 
     Raises:
         InputError: for an invalid case, integrator, time or state.
-        PeerFailed: where the integrator breaks its contract.
+        PeerFailed: if the integrator breaks its contract.
     """
     import heavytop as ht
     from heavytop.cases import case as case_named
@@ -80,9 +80,9 @@ def gate(
     known = case_named(case)
     trajectory = integrator_or_states
     if isinstance(trajectory, str) or (callable(trajectory) and not isinstance(trajectory, ht.Trajectory)):
-        wanted = list(range(1, 11)) if times is None else times
+        requested_times = list(range(1, 11)) if times is None else times
         trajectory = ht.propagate(
-            known.top, known.start, wanted, precision, integrator=trajectory, system=known.system, **options
+            known.top, known.start, requested_times, precision, integrator=trajectory, system=known.system, **options
         )
     name = "given"
     if isinstance(trajectory, ht.Trajectory):
@@ -106,7 +106,7 @@ def gate(
 
 
 def pytest_assertrepr_compare(op: str, left: object, right: object) -> list[str] | None:
-    """The message of a failed comparison of digits: the numbers, then what the score found."""
+    """The message of a failed comparison of digits: the numbers, then the findings of the score."""
     digits = next((side for side in (left, right) if isinstance(side, DigitsRight)), None)
     if digits is None or op not in _COMPARISONS:
         return None
@@ -114,7 +114,7 @@ def pytest_assertrepr_compare(op: str, left: object, right: object) -> list[str]
 
 
 def _explained(score: Score) -> Iterator[str]:
-    """Few lines, for pytest shows eight: what was scored, what explains its error, the largest errors and drifts."""
+    """At most five lines, for pytest shows eight: the score, its diagnosis, the largest errors and drifts."""
     yield repr(score).splitlines()[0]
     yield from score.diagnosis[:2]
     for label, sizes in (("largest error", score.distance), ("largest drift", score.drift)):

@@ -1,6 +1,6 @@
-"""Plain records with a schema: what the suite writes and the report reads.
+"""Records of measurements, with a schema: rows, metrics, references and reports.
 
-Numbers that measure something are decimal text with their log10 beside them, so that 1e-997 survives.
+Measured numbers are decimal text with their log10, so that 1e-997 does not underflow.
 """
 
 from __future__ import annotations
@@ -23,33 +23,32 @@ SCHEMA = "heavytop-report/2"
 OUT_OF_REACH, CONTRADICTION, FAILED = "out_of_reach", "contradiction", "failed"
 UNSUPPORTED, OUT_OF_TIME, NOT_ASKED = "unsupported", "out_of_time", "not_asked"
 UNMEASURED = OUT_OF_REACH, CONTRADICTION, FAILED, UNSUPPORTED, OUT_OF_TIME, NOT_ASKED
-"""Outcomes of a row that was aborted: it has no metrics, and says why in the place of a reference.
+"""Outcomes of a row that was aborted: it has no metrics, and a reason instead of a reference.
 
-failed: a third-party integrator raised an error, or returned no trajectory.  unsupported: it declares that it
-cannot do what was asked: not a failure.  out_of_time: it was stopped at the time limit of its row.
-not_asked: it had run out of time in two other rows of that run."""
+failed: a third-party integrator raised an error, or returned no trajectory.  unsupported: the request is beyond its
+declared capabilities, which is no failure.  out_of_time: it was stopped at the time limit of its row.
+not_asked: it ran out of time in two other rows of that run."""
 
 HEYOKA, MULTIWORD = "heyoka", "multiword"
 FINEST = "eps"
-"""In the place of a tolerance: the finest that an integrator offers."""
+"""As a tolerance: the finest one of the integrator."""
 EXACT = "exact"
-"""The precision of a row in which no format is involved."""
+"""The precision of a row without a format."""
 Direction = Literal["", "forward", "backward"]
 Bits = Annotated[int, msgspec.Meta(ge=0, le=100_000)]
 Starts = Annotated[int, msgspec.Meta(ge=1)]
 Count = Annotated[int, msgspec.Meta(ge=0)]
 Seconds = Annotated[float, msgspec.Meta(ge=0)]
 UNRESOLVED_SECONDS = "unresolved"
-"""Part of the seconds of a row: how many are resolved at least, where its own are fewer."""
+"""Key of the seconds of a row: the resolution, if its own are shorter."""
 MetricKind = Literal["error", "duration", "value"]
-"""How two values of a metric compare: a smaller error is better, a longer duration is better, a value must agree."""
+"""The comparison of two values: a smaller error and a longer duration are better, other values must agree."""
 
 
 class Quantity(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
-    """The subject of a number: ``drift`` of the ``energy``, its ``max`` over the samples.
+    """The quantity of a number, such as the ``max`` over the samples of the ``drift`` of the ``energy``.
 
-    component: of a vector, or a first integral.  statistic: over the samples; of an equation its branch and domain are
-    the quantity's too.
+    component: of a vector, or a first integral.  statistic: over the samples.  branch, domain: of an equation.
     """
 
     name: str
@@ -73,10 +72,10 @@ class Quantity(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 class Metric(msgspec.Struct, frozen=True, gc=False):
     """One measured number.
 
-    quantity: what it is; its text is the metric's key in the report.
-    value: decimal text; or a word: "nan", "missing", "never", "unresolved" (smaller than ten radii
-    of the reference, see ``bound``).
-    log10: its decimal logarithm; null for 0 and for the words.
+    quantity: its text is the key of the metric in the report.
+    value: decimal text, or a word: "nan", "missing", "never", "unresolved" (smaller than ten radii of the reference;
+    see ``bound``).
+    log10: its decimal logarithm; null for 0 and for words.
     band: half-width in decades of the 95 % interval in which rounding noise alone moves the value, where measured.
     """
 
@@ -88,23 +87,23 @@ class Metric(msgspec.Struct, frozen=True, gc=False):
     quantity: Quantity | None = None
 
     def __float__(self) -> float:
-        """The nearest double, 0 where that is too small; the bound of what is unresolved, nan for the other words."""
+        """The double nearest to :attr:`number`."""
         return float(self.number)
 
     @property
     def number(self) -> Fraction | float:
-        """Its value exactly, of what is unresolved the bound; ``never`` is infinite, the other words are nan."""
+        """The exact value, or the bound of an unresolved one; infinity for ``never``, nan for other words."""
         return _parsed(self.value if self.bound is None else self.bound)
 
     @property
     def size(self) -> float | None:
-        """log10 of its absolute value, of what is unresolved that of the bound; None for 0 and for the other words."""
+        """log10 of the absolute value, or of the bound of an unresolved one; None for 0 and for other words."""
         if self.bound is None:
             return self.log10
         return log10_of(self.number) if isinstance(self.number, Fraction) else None
 
     def __eq__(self, other: object) -> bool:
-        """Whether all fields are the same, or of a plain number whether it is that number."""
+        """Whether all fields of two metrics are equal; whether the number is equal to a plain number."""
         if isinstance(other, Metric):
             return super().__eq__(other)
         return isinstance(other, int | float | Fraction) and self.number == other
@@ -114,7 +113,7 @@ class Metric(msgspec.Struct, frozen=True, gc=False):
 
     @property
     def _rank(self) -> tuple[bool, Fraction | float, bytes]:
-        """The key of their order: the number, nan last; among equal ones the fields, as equality is by all."""
+        """The sort key: the number, nan last, then all fields, as in equality."""
         number = self.number
         unknown = number != number
         return unknown, 0 if unknown else number, msgspec.json.encode(self)
@@ -123,7 +122,7 @@ class Metric(msgspec.Struct, frozen=True, gc=False):
         return less(self._rank, other._rank) if isinstance(other, Metric) else less(self.number, float(other))
 
     def __lt__(self, other: SupportsFloat) -> bool:
-        """By the numbers, exactly: 1e-997 is less than 1e-996.  Of two metrics just one is less, or they are equal."""
+        """The exact order of numbers, 1e-997 < 1e-996, which is total on metrics."""
         return self._is(lt, other)
 
     def __le__(self, other: SupportsFloat) -> bool:
@@ -138,7 +137,7 @@ class Metric(msgspec.Struct, frozen=True, gc=False):
 
 @lru_cache(1 << 14)
 def _parsed(text: str) -> Fraction | float:
-    """The number of a text, which is read once however often it is compared."""
+    """The number of a text, cached for repeated comparisons."""
     try:
         return Fraction(text)
     except ValueError:
@@ -162,14 +161,14 @@ Growth = Literal["bounded", "t^0.5", "t", "t^1.5", "t^2", "exponential", "unreso
 
 
 class Law(msgspec.Struct, frozen=True, gc=False):
-    """How a quantity grows with |t|: a fit to its RMS over an ensemble of starts.
+    """A growth law: a fit in |t| to the RMS of a quantity over an ensemble of starts.
 
-    growth: the class; exponent of |t| (or rate of e^(rate |t|) where exponential) with its 95 % bootstrap interval over
-    starts, null where there is too little to fit.
-    first, last: the span of |t| that was fitted, which ends before saturation.
-    detects: decimal text; the smallest relative fault a step that this ensemble would have distinguished from the
-    healthy law. lost_at: |t| from which the format holds no digit, reached or extrapolated; null where no law says so.
-    bend: 95 % interval of how much larger the exponent of the later half of the span is than that of the earlier half.
+    growth: the class.  exponent: of |t| (the rate of e^(rate |t|) if exponential), with its 95 % bootstrap interval
+    over starts; null if there are too few data.
+    first, last: the fitted span of |t|, which ends before saturation.
+    detects: decimal text; the smallest relative fault per step that this ensemble distinguishes from the healthy law.
+    lost_at: |t| from which all significant digits are lost, reached or extrapolated; null if no law determines it.
+    bend: 95 % interval of the exponent of the later half of the span minus that of the earlier half.
     """
 
     growth: Growth
@@ -188,9 +187,9 @@ class Law(msgspec.Struct, frozen=True, gc=False):
 class Subject(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     """The object of a measurement.
 
-    name: of the claim or the integrator.  branch, form: of a formula.  tolerance, step: asked of an integrator, "" for
-    what it does by itself.  high_accuracy: heyoka's.  bias: of a planted fault.  seed: of random starts.
-    version: of a program, as it says it; rows of two versions are one row in two reports.
+    name: of the claim or the integrator.  branch, form: of a formula.  tolerance, step: of an integrator, "" for its
+    default.  high_accuracy: heyoka's.  bias: of a planted fault.  seed: of random starts.
+    version: reported by a program; it does not distinguish rows of two reports.
     """
 
     what: Literal["claimed", "computed", "given"]
@@ -206,33 +205,33 @@ class Subject(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
     @property
     def variant(self) -> str:
-        """The words that set it apart from a plain one, as rows of ensembles name it."""
+        """The options that differ from the defaults, as text in rows of ensembles."""
         parts = {
             "high_accuracy": self.high_accuracy,
             f"tolerance {self.tolerance}": self.tolerance,
             f"I1 off by {self.bias}": self.bias,
             f"seed {self.seed}": self.seed != 1,
         }
-        return ", ".join(text for text, said in parts.items() if said)
+        return ", ".join(text for text, shown in parts.items() if shown)
 
     @property
     def setting(self) -> str:
-        """``tolerance=1e-9`` or ``step=1/50``; "" where neither is asked for."""
+        """``tolerance=1e-9`` or ``step=1/50``; "" without either."""
         return f"tolerance={self.tolerance}" if self.tolerance else f"step={self.step}" if self.step else ""
 
     @property
     def asked(self) -> str:
-        """The control in words: ``tolerance 1e-9``, ``step 1/50``, or ``finest``."""
+        """The control parameter as text: ``tolerance 1e-9``, ``step 1/50``, or ``finest``."""
         if FINEST in (self.tolerance, self.step):
             return "finest"
         return f"tolerance {self.tolerance}" if self.tolerance else f"step {self.step}" if self.step else ""
 
 
 class RowKey(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
-    """The identity of a row, by which it is found in another report.
+    """The key of a row, which identifies it in another report.
 
-    precision: written always: a default is left out where it is the same object, and not where a worker sent it.
-    direction: of time, where rows differ in it.  horizon: the last time, as text.
+    precision: always written: msgspec omits a default by object identity, which a transfer from a worker changes.
+    direction: of time, if rows differ in it.  horizon: the last time, as text.
     """
 
     kind: str
@@ -244,17 +243,17 @@ class RowKey(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     horizon: str = "0"
 
     def of_version(self, version: str) -> RowKey:
-        """The key of what that version of its program computes."""
+        """The key with this version of the program."""
         if version == self.subject.version:
             return self
         return msgspec.structs.replace(self, subject=msgspec.structs.replace(self.subject, version=version))
 
 
 class Certified(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
-    """That two sources of a known motion agree at a time.
+    """The agreement of two sources of a known motion at a time.
 
-    digits: to which they do; None for exactly.  proven: whether both are proofs at that time, at both ends of the way
-    there, or one is computed.  starts, of_starts: how many starts of an ensemble are certified so; None for one motion.
+    digits: that agree; None if equal.  proven: whether both are proofs at that time, or at both ends of the interval,
+    or one is computed.  starts, of_starts: the number of certified starts of an ensemble; None for one motion.
     """
 
     time: str
@@ -266,7 +265,7 @@ class Certified(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
     @property
     def text(self) -> str:
-        """In words."""
+        """The certificate as text."""
         agreement = "exactly" if self.digits is None else f"to {self.digits} digits"
         if self.starts is None:
             return f"certified at t = {self.time} {agreement} by {self.source} ({self.proven})"
@@ -281,9 +280,9 @@ _FORMER_LOST = ", and no digit is left from t = "
 class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     """The reference that a row was compared with.
 
-    how: with proven values, with computed ones, with equations, or with none but its own first integrals.
-    radius: decimal text, of the proven balls, or within which two computed runs agree.  certificates: the first start's
-    before that of all starts.  reason: why it is missing, or none that is proven.
+    how: proven values, computed ones, equations, or none but its own first integrals.
+    radius: decimal text, of the proven balls, or of the agreement of two computed runs.  certificates: that of the
+    first start before that of all starts.  reason: why there is none, or none that is proven.
     until: decimal text; the time from which all significant digits of the format are lost.
     """
 
@@ -296,7 +295,7 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
     @property
     def text(self) -> str:
-        """In a sentence."""
+        """The reference as text."""
         if self.how == "none":
             return f"its own first integrals; {self.reason}"
         if self.how == "equations" or (self.how == "proven" and not self.radius):
@@ -310,19 +309,19 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
     @property
     def certified(self) -> str:
-        """Text of its certificates: at which time a second source agrees, and to how many digits."""
+        """The text of its certificates."""
         return ", for the first start; ".join(certificate.text for certificate in self.certificates)
 
     @property
     def brief(self) -> str:
-        """The method and its proven error alone, where there are both."""
+        """The method and its proven error alone, if there are both."""
         proven = self.how == "proven" and self.radius
         return f"{self.method}, error < {self.radius.lower()} (proven)" if proven else self.text
 
 
 class Data(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
-    """The exact data of a motion, as text; omega and gamma are its start, or for an ensemble that by which its random
-    starts are drawn, empty in older reports; rotor is k of a top that has one.
+    """The exact data of a motion, as text; omega and gamma are its start, or that from which the random starts of an
+    ensemble are drawn, empty in older reports; rotor is k of a top that has one.
     """
 
     inertia: tuple[str, ...]
@@ -334,9 +333,9 @@ class Data(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
 
 NOISE, NOT_MEASURED = "noise", "not measured"
-"""The flag of a row whose plan says ``noise = false``."""
+"""The flag of a row with ``noise = false`` in the plan."""
 NOT_CARRIED = {"attitude": "not carried"}
-"""The flag of a row whose plan asks for the attitude, and whose integrator does not carry it."""
+"""The flag of a row whose plan requests the attitude, and whose integrator does not carry it."""
 
 
 class Worst(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
@@ -354,7 +353,7 @@ class Worst(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
 
 class Histogram(msgspec.Struct, frozen=True, gc=False):
-    """How many values lie in bins of equal width in decades; first: log10 of the left edge of the first."""
+    """Counts in bins of equal width in decades; first: log10 of the left edge of the first bin."""
 
     first: float
     width: float
@@ -362,9 +361,9 @@ class Histogram(msgspec.Struct, frozen=True, gc=False):
 
 
 class CellMap(msgspec.Struct, frozen=True, gc=False):
-    """The median of the digits lost in each cell of two data, rows from below; None in a cell without a motion.
+    """The median of the digits lost in each cell of a plane of two data, rows from below; None in an empty cell.
 
-    x, y: names of columns of the records; their edges are one more than the cells.
+    x, y: names of columns of the records, with the edges of the cells.
     """
 
     x: str
@@ -375,14 +374,14 @@ class CellMap(msgspec.Struct, frozen=True, gc=False):
 
 
 class Spread(msgspec.Struct, frozen=True, gc=False):
-    """How the quantities of a survey's motions are distributed, by the names of their columns, and over which data."""
+    """The distributions of the quantities of a survey, by column, and a map over two data."""
 
     histograms: dict[str, Histogram]
     map: CellMap | None
 
 
 class Explained(msgspec.Struct, frozen=True, gc=False):
-    """A mistake that explains the states of a run: kind, one of those of ``diagnosis`` of a score; text: a sentence."""
+    """A mistake that explains the states of a run.  kind: as in ``diagnosis`` of a score.  text: a sentence."""
 
     kind: str
     text: str
@@ -394,21 +393,20 @@ _DERIVED = "system", "precision", "horizon", "measure", "against"
 class Row(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     """One measurement, of one motion compared with one reference.
 
-    key: what is measured, of what, how, over which time; case and integrator are what it is called for other programs.
-    reference: what it was compared with; measured says in words what was.
-    system, precision, horizon, measure and against are what other programs read of the key and the reference.  They
-    follow from these, and stand in a row where none gives them; ValueError where one is given and is another.
-    outcome, time_reached, steps, finite travel with every number.  seconds: timings, compared where they have a band.
-    evaluations: of the field, where the integrator counts them.
-    samples: how many times the largest values are over; 0 where that is not said.
-    data: of the top and its start, before any rounding; null where no motion is measured.
-    request: what the table of the plan asks that no other field says, such as the sweep of a survey.
-    amplification: the largest factor by which the motion itself has amplified a change of its state, whenever that was
-    made, up to the horizon, an estimate; null where no single motion is integrated.
-    explained: what explains the states of a third-party integrator that are far off, where something does.
-    starts: how many starts stand behind the row; laws: how its series grow, by the name of the series.
-    worst: of a survey, first the worst; spread: its distributions.  chunk: Parquet bytes of a part of one; no report
-    holds it.
+    key: kind, subject and span of the measurement; case and integrator are the names for other programs.
+    reference: of the comparison; measured: a description of the measured motion.
+    system, precision, horizon, measure and against repeat the key and the reference for other programs.  They are
+    filled in if left out; ValueError for another value.
+    seconds: timings, compared if they have a band.  evaluations: of the field, if the integrator counts them.
+    samples: the number of times of the statistics; 0 if unknown.
+    data: of the top and its start, before any rounding; null if no motion is measured.
+    request: settings of the plan that no other field has, such as the sweep of a survey.
+    amplification: an estimate of the largest factor by which the motion amplifies a change of its state, made at any
+    time, up to the horizon; null unless a single motion is integrated.
+    explained: a mistake that explains large errors of a third-party integrator, if one is found.
+    starts: the number of starts of the row; laws: growth laws by the name of the series.
+    worst: of a survey, the worst first; spread: its distributions.  chunk: Parquet bytes of a part of one, in no
+    report.
     """
 
     case: str
@@ -457,18 +455,18 @@ class Row(msgspec.Struct, frozen=True, gc=False, kw_only=True):
 
     @property
     def identity(self) -> Identity:
-        """The identity of the row in another report, and what it is called there."""
+        """The key of the row without version, and its names."""
         return Identity(self.key.of_version(""), self.case, self.integrator)
 
     def metric(self, name: str, component: str = "", statistic: str = "") -> Metric | None:
-        """The metric of that quantity, if it is there."""
+        """The metric of that quantity, or None."""
         return self.metrics.get(Quantity(name, component, statistic).text)
 
 
 class Identity(NamedTuple):
-    """A row's key without a version, and the names under which other programs know it.
+    """The key of a row without version, and its names for other programs.
 
-    versions: of its program in two reports that are compared; empty where neither says one.
+    versions: of its program in two compared reports; empty if neither has one.
     """
 
     key: RowKey
@@ -478,19 +476,19 @@ class Identity(NamedTuple):
 
     @property
     def named(self) -> dict[str, str]:
-        """Its part of JSON documents."""
+        """The entries of JSON documents."""
         key = self.key
         named = {"measure": key.kind, "case": self.case, "system": key.system, "integrator": self.integrator}
         return named | {"precision": key.precision, "horizon": key.horizon}
 
     @property
     def program(self) -> str:
-        """The integrator by name, with its version, or both where they differ."""
+        """The name of the integrator with its version, or both versions if they differ."""
         return f"{self.key.subject.name} {' → '.join(dict.fromkeys(self.versions))}".rstrip()
 
     @property
     def elsewhere(self) -> Identity:
-        """The key without its horizon."""
+        """The identity without horizon."""
         return self._replace(key=msgspec.structs.replace(self.key, horizon=""))
 
 
@@ -505,7 +503,7 @@ class Peer:
 
 
 class Beside(msgspec.Struct, frozen=True, gc=False):
-    """Findings of `score` beside its row: heyoka's own run, and sentences on the error that nothing reads."""
+    """Further findings of `score`: heyoka's run, and remarks on the error, for people only."""
 
     peer: Peer | None
     remarks: tuple[str, ...]
@@ -514,7 +512,7 @@ class Beside(msgspec.Struct, frozen=True, gc=False):
 class Report(msgspec.Struct, frozen=True, omit_defaults=True):
     """A run of a plan: schema, plan (name and content hash), environment, rows in the plan's order.
 
-    beside: of a report that `score` wrote.
+    beside: of a report by `score`.
     """
 
     schema: str
@@ -524,59 +522,59 @@ class Report(msgspec.Struct, frozen=True, omit_defaults=True):
     beside: Beside | None = None
 
 
-# Names that integrators had before, read as those that they have: in plans, options and reports of then.
+# Former names of integrators, in plans, options and reports.
 
 
 INTEGRATORS = {"words": "multiword"}
-"""Former names of integrators, and those of now."""
+"""Current names of integrators by their former names."""
 
 
 def current(name: str) -> str:
-    """The name that an integrator has now, of the one that it was given."""
+    """The current name of an integrator."""
     return INTEGRATORS.get(name, name)
 
 
 def notice(name: str) -> str:
-    """A sentence for whoever gives a name of before; empty for any other."""
+    """A notice for a former name; empty for any other."""
     return f"the integrator {name} is called {INTEGRATORS[name]} now" if name in INTEGRATORS else ""
 
 
 def in_document(part: Any) -> set[str]:
-    """The former names that an ``integrator = "NAME"`` of a plan's document gives, however deep."""
+    """The former names in ``integrator = "NAME"`` of a plan's document, at any depth."""
     if isinstance(part, list):
         return set().union(*map(in_document, part))
     if not isinstance(part, dict):
         return set()
     integrator = part.get("integrator")
-    own = {integrator} if isinstance(integrator, str) and integrator in INTEGRATORS else set()
-    return own.union(*(in_document(item) for item in part.values()))
+    names = {integrator} if isinstance(integrator, str) and integrator in INTEGRATORS else set()
+    return names.union(*(in_document(item) for item in part.values()))
 
 
 def of_document(part: Any) -> Any:
-    """A plan's document with the names of now."""
+    """The document of a plan with current names."""
     if isinstance(part, list):
         return [of_document(item) for item in part]
     if not isinstance(part, dict):
         return part
-    plain = {name: of_document(item) for name, item in part.items()}
+    document = {name: of_document(item) for name, item in part.items()}
     if isinstance(integrator := part.get("integrator"), str):
-        plain["integrator"] = current(integrator)
-    return plain
+        document["integrator"] = current(integrator)
+    return document
 
 
 def of_plan(plan: dict[str, str]) -> dict[str, str]:
-    """The plan block of a report with the name of now of the integrator that was measured beside heyoka."""
+    """The plan block of a report with the current name of its integrator."""
     integrator = plan.get("integrator", "")
     return plan | {"integrator": current(integrator)} if integrator in INTEGRATORS else plan
 
 
 def of_identity(identity: dict[str, str]) -> dict[str, str]:
-    """The request that must be the same for a run to go on, with that name of now."""
+    """The identity of a run, which must match on resume, with the current name of its integrator."""
     return {key: current(value) if key == "plan integrator" else value for key, value in identity.items()}
 
 
 def of_row(row: Row) -> Row:
-    """The row with the names of now of its integrator and its arithmetic; itself where it has these already."""
+    """The row with the current names of its integrator and arithmetic."""
     if row.flags.get("arithmetic") == "whole numbers":
         row = msgspec.structs.replace(row, flags=row.flags | {"arithmetic": "integers"})
     subject = row.key.subject

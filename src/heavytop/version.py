@@ -1,4 +1,4 @@
-"""Which version this is, and which commit it was made from."""
+"""Version and commit of the program."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ def version() -> str:
 
 
 def commit() -> str | None:
-    """The commit of the checkout that the program runs from, with "-dirty" where files differ from it; else the one
-    that the wheel was built from (``hatch_build.py`` records it); None where neither is known.
+    """The commit of the checkout that the program runs from, with "-dirty" if files differ from it; else that of the
+    wheel (recorded by ``hatch_build.py``); None if both are unknown.
     """
     return _of_checkout() or recorded()
 
 
 def recorded() -> str | None:
-    """The commit that the installed wheel was built from."""
+    """The commit of the installed wheel."""
     try:
         text = metadata.distribution("heavytop").read_text("extra_metadata/commit.txt")
     except metadata.PackageNotFoundError:
@@ -33,7 +33,7 @@ def _of_checkout() -> str | None:
     if not (here.parents[1] / "pyproject.toml").exists():
         return None  # an installed copy may lie inside somebody else's repository
     try:
-        done = subprocess.run(
+        completed = subprocess.run(
             ["git", "-C", str(here), "describe", "--always", "--dirty", "--abbrev=40", "--match="],
             capture_output=True,
             text=True,
@@ -42,4 +42,4 @@ def _of_checkout() -> str | None:
         )
     except (OSError, subprocess.TimeoutExpired):
         return None
-    return done.stdout.strip() if done.returncode == 0 else None
+    return completed.stdout.strip() if completed.returncode == 0 else None

@@ -1,4 +1,4 @@
-"""Numbers as other programs write them, read exactly, and the format that they were written from."""
+"""Exact values of numbers written by other programs, and the format that they were written from."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, decimal_text, 
 _HEX = re.compile(r"([+-]?)0[xX](?=\.?[0-9a-fA-F])([0-9a-fA-F]*)\.?([0-9a-fA-F]*)(?:[pP]([+-]?[0-9]{1,6}))?")
 _NOT_FINITE = re.compile(r"[+-]?(nan(\([^)]*\))?|inf|infinity|1\.?#(inf|ind|qnan|snan)\d*)", re.IGNORECASE)
 _FORTRAN = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[dDqQ]|(?=[+-]\d{3,}$))([+-]?\d+)")
-"""1.5D+00, 1.5Q+00, and 1.5-101, where there was no room for the letter."""
+"""1.5D+00, 1.5Q+00, and 1.5-101, where the exponent leaves no room for the letter."""
 _PLAIN = re.compile(r"[+-]?\d{1,40}(\.\d{0,40})?([eE][+-]?\d{1,3})?")
-"""Most numbers; none of them is beyond what is read."""
+"""Most numbers; all of these are within the limits."""
 _WIDEST = 20_000
-"""Exponents of 2 in a file, up to that: quad has 16,384, and powers of what is larger take minutes."""
+"""The largest exponent of 2 in a file: quad has 16,384, and larger powers take minutes."""
 _REMEDY = "`heavytop docs score` shows both forms of the file."
-_ASKED = 600
-"""Numbers that are looked at for what format they were written from."""
+_SAMPLE = 600
+"""The most numbers from which the format is inferred."""
 
 
 def number(value: Any, what: str) -> Fraction | None:
-    """An exact number out of decimal or hexadecimal text; None for NaN and infinities; InputError for anything else."""
+    """The exact number of decimal or hexadecimal text; None for NaN and infinities; raises InputError for others."""
     if not isinstance(value, str):
         raise InputError(f"{what} is a {type(value).__name__}, not a number.", _REMEDY)
     text = value.strip()
@@ -35,8 +35,8 @@ def number(value: Any, what: str) -> Fraction | None:
         return None
     hexadecimal, fortran = _HEX.fullmatch(text), _FORTRAN.fullmatch(text)
     if hexadecimal is not None:
-        sign, whole, part, power = hexadecimal.groups()
-        fraction = Fraction(int(f"{sign}{whole}{part}", 16)) * Fraction(2) ** (int(power or 0) - 4 * len(part))
+        sign, integer, part, power = hexadecimal.groups()
+        fraction = Fraction(int(f"{sign}{integer}{part}", 16)) * Fraction(2) ** (int(power or 0) - 4 * len(part))
     else:
         with prefixed(what):
             fraction = exact(f"{fortran[1]}e{fortran[2]}" if fortran else text)
@@ -54,16 +54,16 @@ def finite(value: Any, what: str) -> Fraction:
 
 
 def format_of(texts: Iterable[str]) -> Precision:
-    """The narrowest format that holds every number as it is written.
+    """The narrowest format from which every number may have been printed.
 
-    A program may write more digits than its format has: 0.1000000000000000056 is a double in 19 digits, because the
-    double nearest to it has just these digits.
+    A program may print more digits than its format has: 0.1000000000000000056 is a double in 19 digits, because the
+    nearest double has these digits.
     """
-    every = list(texts)
-    bits = max((bits_of(text) for text in every), default=0)
-    some = every[:: max(1, len(every) // _ASKED)]
+    numbers = list(texts)
+    bits = max((bits_of(text) for text in numbers), default=0)
+    sample = numbers[:: max(1, len(numbers) // _SAMPLE)]
     for form in (DOUBLE, EXTENDED, QUAD):
-        if bits <= form.bits or all(_is_printed_from(text, form) for text in some):
+        if bits <= form.bits or all(_is_printed_from(text, form) for text in sample):
             return form
     return real(bits)
 
@@ -74,7 +74,7 @@ def of_bits(bits: int) -> Precision:
 
 
 def bits_of(text: str) -> int:
-    """Bits that a number was written from: its own if it is hexadecimal, else as many as its decimal digits name."""
+    """Bits of the format of a number: its own if hexadecimal, else those that its decimal digits correspond to."""
     if _HEX.fullmatch(text.strip()):
         value = number(text, "a number") or Fraction(0)
         return (value.numerator // (value.numerator & -value.numerator)).bit_length() if value else 0
@@ -90,7 +90,7 @@ def digits_written(text: str) -> int:
 
 
 def _is_printed_from(text: str, form: Precision) -> bool:
-    """Whether the number, rounded to the format and written with as many digits, is the same text."""
+    """Whether the number, rounded to the format and printed with as many digits, is unchanged."""
     value = number(text, "a number")
     if not value:
         return True
