@@ -1,4 +1,4 @@
-"""The command line.  Only this room prints; each command is a few lines that join the other rooms.
+"""The command line.  Only this package prints; each command is a few lines that call the others.
 
 Exit codes, :class:`heavytop.errors.ExitCode`: 0 good, 1 a finding, 2 usage, bad input, or an output that cannot be
 written, 3 incomplete, undecided, incomparable or out of reach, 130 interrupted, 141 nobody reads the output any more,
@@ -62,13 +62,13 @@ def run_command_line() -> int:
 
 
 def _run() -> int:
-    """The exit code of the command; what it raises but for exits passes."""
+    """The exit code of the command; other exceptions propagate."""
     arguments = with_file_of_latex(sys.argv[1:])
-    asked = copy(app)  # options of the other commands take a tenth of a second to make
+    only_this = copy(app)  # options of the other commands take a tenth of a second to make
     named = [command for command in app.registered_commands if [command.name] == arguments[:1]]
-    asked.registered_commands = named or app.registered_commands
+    only_this.registered_commands = named or app.registered_commands
     try:
-        asked(args=arguments, prog_name="heavytop")
+        only_this(args=arguments, prog_name="heavytop")
     except SystemExit as ended:
         return (
             ended.code if isinstance(ended.code, int) else ExitCode.GOOD if ended.code is None else ExitCode.BAD_INPUT
@@ -77,7 +77,7 @@ def _run() -> int:
 
 
 def _failed(message: str, code: int = ExitCode.BAD_INPUT) -> int:
-    """Say why; what standard output holds so far is still written where that is possible."""
+    """Print the error; flush standard output if possible."""
     output.say(message)
     try:
         sys.stdout.flush()

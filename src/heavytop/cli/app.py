@@ -1,4 +1,4 @@
-"""The parts that commands share: the application, printing, exact numbers in options."""
+"""Shared parts of the commands: the application, printing, exact numbers in options."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ app = typer.Typer(
 SHELLS = ("bash", "zsh", "fish")
 
 
-def _version(asked: bool) -> None:
-    if asked:
+def _version(requested: bool) -> None:
+    if requested:
         from heavytop.version import commit, version
 
-        made_from = commit()
-        print(f"heavytop {version()}" + (f" (commit {made_from})" if made_from else ""))
+        commit_text = commit()
+        print(f"heavytop {version()}" + (f" (commit {commit_text})" if commit_text else ""))
         raise typer.Exit
 
 
@@ -69,21 +69,21 @@ Json = Annotated[bool, typer.Option("--json", help="One JSON document on standar
 
 
 def plans(begun: str) -> list[str]:
-    """Plans whose names begin so, for completion."""
+    """Plans whose names begin with this text, for completion."""
     from heavytop.harness import BUILT_IN
 
     return [name for name in BUILT_IN if name.startswith(begun)]
 
 
 def cases(begun: str) -> list[str]:
-    """Cases whose names begin so, for completion."""
+    """Cases whose names begin with this text, for completion."""
     from heavytop.cases import CASES
 
     return [name for name in CASES if name.startswith(begun)]
 
 
 class _Command(TyperCommand):
-    """A command whose help shows of a list of files the type of its entries."""
+    """A command whose help shows the type of the entries of a list of files."""
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
@@ -93,14 +93,14 @@ class _Command(TyperCommand):
 
 
 def command(function: Callable[..., int]) -> Callable[..., None]:
-    """A command of the program that ends with the exit code which ``function`` returns."""
+    """A command that exits with the code returned by ``function``."""
 
     @wraps(function)
     def with_exit_code(*args: Any, **options: Any) -> None:
         from heavytop.cli.output import told_when_slow
 
         with told_when_slow(name), warnings.catch_warnings():
-            warnings.simplefilter("ignore", ImpossibleBody)  # the command says so itself
+            warnings.simplefilter("ignore", ImpossibleBody)  # the command prints it itself
             code = function(*args, **options)
         raise typer.Exit(code)
 
@@ -109,7 +109,7 @@ def command(function: Callable[..., int]) -> Callable[..., None]:
 
 
 def show_on_terminal(renderable: Any) -> None:
-    """Print text or a rich table, as wide as the terminal or COLUMNS says, or 160 columns into a file."""
+    """Print text or a rich table, with the width of the terminal or COLUMNS, or 160 columns into a file."""
     from rich.console import Console
 
     console = Console(
@@ -126,31 +126,31 @@ def print_json(document: Any) -> None:
 
     try:
         text = msgspec.json.format(msgspec.json.encode(document), indent=1).decode()
-    except UnicodeEncodeError:  # the name of a file other than text
+    except UnicodeEncodeError:  # a file name that is not valid text
         text = json.dumps(msgspec.to_builtins(document), indent=1)
     print(printable(text))
 
 
 def require_new(folder: Path) -> None:
-    """Raises InputError for a folder that holds anything already."""
+    """Raise InputError for a folder that is not empty."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder} already holds other content.", "Give a new folder with --out.")
 
 
 def require_apart(files: Iterable[Path | None], *read: Path | None) -> None:
-    """Raises InputError where a file to be written is named twice, or is one that is read, or a report in a folder."""
+    """Raise InputError if an output file is given twice, or is an input, or the report of an input folder."""
     written = [path for path in files if path is not None]
     sources = [candidate for path in read if path and written for candidate in (path, path / "report.json")]
-    taken = {absolute(source).resolve() for source in sources if source.is_file()}
+    used = {absolute(source).resolve() for source in sources if source.is_file()}
     for path in written:
         target = absolute(path).resolve()
-        if target in taken:
+        if target in used:
             raise InputError(f"{path} is named twice.", "Give each file a name of its own.")
-        taken.add(target)
+        used.add(target)
 
 
 def absolute(path: Path) -> Path:
-    """The path from the root, whatever anyone does to the working directory; raises InputError where that is gone."""
+    """The absolute path, independent of later changes of the working directory; raises InputError if that is gone."""
     try:
         return path.absolute()
     except OSError:
@@ -161,7 +161,7 @@ def absolute(path: Path) -> Path:
 
 @contextmanager
 def writing() -> Iterator[None]:
-    """A file that cannot be written is an error with the remedy of a command that writes one file."""
+    """Give the error of a file that cannot be written the remedy of a command that writes one file."""
     try:
         yield
     except InputError as error:
@@ -169,5 +169,5 @@ def writing() -> Iterator[None]:
 
 
 def numbers(text: str) -> list[str]:
-    """The parts of ``a,b,c``, still text."""
+    """The parts of ``a,b,c`` as text."""
     return [part.strip() for part in text.split(",")]

@@ -84,7 +84,7 @@ def gate(
 def _bless(
     ended: FinishedRun, differences: Comparison | None, trusted: tuple[Path, Path], fresh: tuple[Path, Path], json: bool
 ) -> int:
-    """Move the baseline and say how it is committed.  trusted, fresh: the folders, absolute and as they are named."""
+    """Move the baseline and print how to commit it.  trusted, fresh: the folders, absolute and as typed."""
     from heavytop.api.gate import MESSAGE, bless
 
     message = bless(fresh[0], trusted[0], ended.summary, differences)

@@ -131,7 +131,7 @@ def _about(case: dict[str, Any]) -> str:
 
 
 def _lines(notes: dict[str, str], indent: int = 0) -> None:
-    """A name and its note a line, folded at 80 columns."""
+    """Print a name and its note per line, folded at 80 columns."""
     width = max(map(len, notes))
     for name, note in notes.items():
         print(fill(note, 80, initial_indent=f"  {name:{width}} ", subsequent_indent=" " * (width + 3 + indent)))
@@ -142,7 +142,7 @@ def _one_case(name: str, json: bool) -> int:
 
     document = case_document(name)
     if json:
-        print_json({key: value for key, value in document.items() if key != "json"})  # it would stand in itself
+        print_json({key: value for key, value in document.items() if key != "json"})  # it would contain itself
         return ExitCode.GOOD
     print(fill(f"{document['name']}: {document['about']}", 80))
     if document["source"]:

@@ -1,4 +1,4 @@
-"""Markdown on a terminal, with whole words in the columns of its tables."""
+"""Markdown on a terminal, with complete words in the columns of tables."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from rich.table import Table
 
 
 class _FoldedTable(TableElement):
-    """A table whose long words go on in the next line."""
+    """A table that wraps long words."""
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         for table in super().__rich_console__(console, options):
@@ -19,6 +19,6 @@ class _FoldedTable(TableElement):
 
 
 class Page(Markdown):
-    """A page of Markdown for the console of rich."""
+    """A page of Markdown for a console of rich."""
 
     elements = Markdown.elements | {"table_open": _FoldedTable}

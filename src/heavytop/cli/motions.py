@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from heavytop.top.attitude import Output
 
 
-# One motion on the terminal, as JSON, CSV or LaTeX: the same numbers, with what makes them citable.
+# One motion on the terminal, as JSON, CSV or LaTeX: the same numbers, with the data for a citation.
 
 
 _SCREEN = Path("-")
@@ -36,7 +36,7 @@ _SCREEN_WITHOUT_FILE = ("--latex", "--bibtex")
 
 
 def with_file_of_latex(arguments: list[str]) -> list[str]:
-    """The arguments of the command line, with ``-`` for standard output behind ``--latex``, ``--bibtex`` alone."""
+    """The command-line arguments, with ``-`` for standard output after ``--latex`` and ``--bibtex`` without file."""
     files: list[str] = []
     for argument in (*arguments, "--"):
         if files and files[-1] in _SCREEN_WITHOUT_FILE and argument.startswith("--"):
@@ -46,7 +46,7 @@ def with_file_of_latex(arguments: list[str]) -> list[str]:
 
 
 def made_by() -> tuple[str, str]:
-    """The command as it was typed, and the version and commit of the program."""
+    """The command line, and the version and commit of the program."""
     from heavytop.version import commit, version
 
     made_from = commit()
@@ -54,13 +54,13 @@ def made_by() -> tuple[str, str]:
 
 
 def require_one_output(files: Mapping[str, Path | None], json: bool) -> None:
-    """Raises InputError where standard output would get two documents, or one file two."""
+    """Raise InputError if standard output or a file would get two documents."""
     on_screen = [f"--{name}" for name, path in files.items() if path == _SCREEN] + ["--json"] * json
     if len(on_screen) > 1:
         raise InputError(f"{' and '.join(on_screen)} both print on standard output.", "Give a file for one of them.")
-    for one, other in combinations([name for name, path in files.items() if path not in (None, _SCREEN)], 2):
-        if files[one] == files[other]:
-            raise InputError(f"{files[one]} is asked for as {_AS[one]} and as {_AS[other]}.", "Give two files.")
+    for a, b in combinations([name for name, path in files.items() if path not in (None, _SCREEN)], 2):
+        if files[a] == files[b]:
+            raise InputError(f"{files[a]} is asked for as {_AS[a]} and as {_AS[b]}.", "Give two files.")
 
 
 _AS = {"csv": "CSV", "latex": "LaTeX", "bibtex": "BibTeX"}
@@ -74,9 +74,9 @@ def farthest(times: Sequence[str]) -> Fraction:
 
 
 _PROPAGATE_SECONDS, _REFERENCE_SECONDS = 1.0, 3.0
-"""Expected of a run and of an enclosure, before anything is known of them."""
+"""Initial estimates of the seconds of a run and of an enclosure."""
 _SLOW_BITS = 2000
-"""From here on a single step takes seconds, and about 20 times as long with twice the bits."""
+"""A step with so many bits takes seconds, and about 20 times as long with twice the bits."""
 
 
 def _given(help: str, *name: str, kind: Any = str, **more: Any) -> Any:
@@ -102,7 +102,7 @@ _DATA = {
     "file": _given("Body of a URDF, MJCF, SDF, USD or TOML file, free axes.", "--file", metavar="FILE"),
     "link": _given("Link or body of --file, where it has several."),
 }
-"""Options of body and start, by the keys of a plan."""
+"""Options of body and start by the keys of a plan."""
 _WHICH = _DATA | {
     "case": _given("A case of `heavytop list` in place of body and start.", "--case"),
     "system": _given("heavy_top, gyrostat or heavy_gyrostat; without it heavy_top, or heavy_gyrostat with --rotor."),
@@ -118,26 +118,26 @@ _WHERE = {
     "json": Json,
 }
 _SHARED = _WHICH | _WHERE
-"""The options that `propagate` and `reference` share: which motion, and what is written of it where."""
+"""The options that `propagate` and `reference` share: motion and outputs."""
 
 
 class MotionOptions(Protocol):
-    """Options by which a feature measures more of a motion; a NamedTuple of options of typer."""
+    """Options of a further measurement of a motion by a feature; a NamedTuple of options of typer."""
 
     _fields: ClassVar[tuple[str, ...]]
 
     def require(self) -> str:
-        """The measurement in words, said while it goes on; "" for none.  Raises InputError for what cannot be read."""
+        """The name of the measurement for the progress bar; "" for none.  Raises InputError for invalid options."""
 
     def measure(self, top: Any, start: Any, until: Any, **settings: Any) -> Any:
-        """A measurement with ``to_json()``, entries of the document of the motion, and ``text()``, shown behind it."""
+        """A measurement with ``to_json()``, entries of the document of the motion, and ``text()``, printed after it."""
 
 
 _FURTHER: list[Any] = [feature.load(feature.motion) for feature in FEATURES if feature.motion]
 
 
-class _Asked:
-    """A request, read before anything is computed; raises InputError for what cannot be read."""
+class _Request:
+    """A request, parsed before anything is computed; raises InputError for invalid options."""
 
     def __init__(self, times: str, options: dict[str, Any], further: list[MotionOptions]) -> None:
         self.files = {name: options[name] for name in _AS}
@@ -150,14 +150,14 @@ class _Asked:
         self.further = [(option, what) for option in further if (what := option.require())]
 
     def beside(self, expected: float, **settings: Any) -> list[Any]:
-        """The measurements of features on the motion up to the time farthest from 0.
+        """The measurements of features on the motion, up to the time farthest from 0.
 
         expected: seconds.  settings: of :meth:`MotionOptions.measure`.
         """
         blocks = []
         for options, what in self.further:
             with reaching(what, expected) as reach:
-                settings |= {"system": self.system, "reached": _part_of(self.times, reach)}
+                settings |= {"system": self.system, "reached": _fraction_of(self.times, reach)}
                 blocks.append(options.measure(self.top, self.start, farthest(self.times), **settings))
         return blocks
 
@@ -168,8 +168,8 @@ class _Asked:
         text: Callable[[MotionTable], RenderableType],
         beside: Sequence[Any],
     ) -> None:
-        """Write the files asked for, and one document on standard output: JSON, CSV, LaTeX or the table, with what was
-        measured beside the motion behind.
+        """Write the requested files, and one document on standard output: JSON, CSV, LaTeX or the table, followed by
+        the further measurements.
 
         Raises InputError for a file that cannot be written.
         """
@@ -188,8 +188,8 @@ class _Asked:
                 say(f"wrote {path}")
         if self.json:
             command, version = made_by()
-            whole = reduce(or_, (extra.to_json() for extra in beside), document())
-            print_json({**whole, "command": command, "version": version})
+            complete = reduce(or_, (extra.to_json() for extra in beside), document())
+            print_json({**complete, "command": command, "version": version})
         elif on_screen is not None:
             print(on_screen, end="")
         elif table is not None:
@@ -198,10 +198,10 @@ class _Asked:
 
 
 def _of_a_motion(function: Callable[..., int]) -> Callable[..., int]:
-    """The command with the times and the options that say which motion before its own, and the others behind.
+    """The command with the times and the options of the motion before its own options, and those of outputs after them.
 
-    Typer takes options from the signature of a function alone, and reads neither TypedDict nor Unpack: without one made
-    here, the 25 shared options would stand in both commands.
+    Typer reads options only from the signature of a function, and neither TypedDict nor Unpack: without the signature
+    made here, both commands would repeat the 25 shared options.
     """
 
     names = (*_SHARED, *signature(function).parameters)
@@ -212,7 +212,7 @@ def _of_a_motion(function: Callable[..., int]) -> Callable[..., int]:
     def with_options(times: str, **options: Any) -> int:
         shared = {name: options.pop(name) for name in _SHARED}
         further = [kind(**{name: options.pop(name) for name in kind._fields}) for kind in _FURTHER]
-        return function(_Asked(times, shared, further), **options)
+        return function(_Request(times, shared, further), **options)
 
     def parameter(name: str, hint: Any, default: Any = Parameter.empty) -> Parameter:
         return Parameter(name, Parameter.KEYWORD_ONLY, annotation=hint, default=default)
@@ -223,7 +223,7 @@ def _of_a_motion(function: Callable[..., int]) -> Callable[..., int]:
     middle = []
     for source in (function, *_FURTHER):
         hints, parts = get_type_hints(source, include_extras=True), signature(source).parameters
-        middle += [parameter(name, hints[name], part.default) for name, part in parts.items() if name != "asked"]
+        middle += [parameter(name, hints[name], part.default) for name, part in parts.items() if name != "request"]
     parameters = [parameter("times", _TIMES), *shared(_WHICH), *middle, *shared(_WHERE)]
     vars(with_options)["__signature__"] = Signature(parameters)
     return with_options
@@ -232,7 +232,7 @@ def _of_a_motion(function: Callable[..., int]) -> Callable[..., int]:
 @command
 @_of_a_motion
 def propagate(
-    asked: _Asked,
+    request: _Request,
     precision: Annotated[
         str, typer.Option(help="double, extended, double-double (of multiword), quad, real:BITS.")
     ] = "double",
@@ -257,27 +257,27 @@ def propagate(
     what = "compiling, at the first call, then integration" if compiles(integrator) else "integration"
     with reaching(what, _PROPAGATE_SECONDS) as reach:
         motion = computed_motion(
-            asked.top,
-            asked.start,
-            asked.times,
+            request.top,
+            request.start,
+            request.times,
             precision,
-            system=asked.system,
+            system=request.system,
             angles=attitude,
-            outputs=asked.outputs,
-            reached=_part_of(asked.times, reach),
+            outputs=request.outputs,
+            reached=_fraction_of(request.times, reach),
             step=step,
             **settings,
         )
 
-    beside = asked.beside(_PROPAGATE_SECONDS, precision=precision, **settings)
-    asked.write(motion.to_json, lambda: of_motion(motion, *made_by()), partial(motion_text, motion), beside)
+    beside = request.beside(_PROPAGATE_SECONDS, precision=precision, **settings)
+    request.write(motion.to_json, lambda: of_motion(motion, *made_by()), partial(motion_text, motion), beside)
     return ExitCode.GOOD if motion.complete else ExitCode.INCOMPLETE
 
 
 @command
 @_of_a_motion
 def reference(
-    asked: _Asked,
+    request: _Request,
     digits: Annotated[int, typer.Option(help="Proven digits, 1 to 20000.")] = 50,
     attitude: Annotated[bool, typer.Option("--attitude", help="Also xi, horizontal and fixed in space.")] = False,
     derivatives: Annotated[
@@ -296,26 +296,26 @@ def reference(
     from heavytop.api.motions import reference as proven
     from heavytop.report.render.motion import of_reference, reference_text
 
-    watch, told = _Watch(asked.times), True if attitude or asked.outputs else None
+    watch, with_attitude = _Progress(request.times), True if attitude or request.outputs else None
     with watched("reference", watch.fraction, _REFERENCE_SECONDS):
-        options = {"system": asked.system, "attitude": told, "derivatives": derivatives, "effort": effort}
-        known = proven(asked.top, asked.start, asked.times, digits, finder=watch.find, **options)
-        known.require_outputs(asked.outputs)
+        options = {"system": request.system, "attitude": with_attitude, "derivatives": derivatives, "effort": effort}
+        known = proven(request.top, request.start, request.times, digits, finder=watch.find, **options)
+        known.require_outputs(request.outputs)
 
-    beside = asked.beside(_REFERENCE_SECONDS, digits=digits)
-    document, text = partial(known.document, asked.outputs), partial(reference_text, known)
-    asked.write(document, lambda: of_reference(known, asked.outputs, *made_by()), text, beside)
+    beside = request.beside(_REFERENCE_SECONDS, digits=digits)
+    document, text = partial(known.document, request.outputs), partial(reference_text, known)
+    request.write(document, lambda: of_reference(known, request.outputs, *made_by()), text, beside)
     return ExitCode.GOOD
 
 
 def _outputs(show: str | None, point: str | None, pivot: str | None) -> tuple[Output, ...]:
-    """The outputs asked for; raises InputError for one that is unknown, and for a point or pivot without a position."""
+    """The requested outputs; raises InputError for an unknown one, and for a point or pivot without position."""
     from heavytop.top.attitude import outputs
 
-    places = [None if point_text is None else numbers(point_text) for point_text in (point, pivot)]
-    if show is None and places == [None, None]:
+    positions = [None if point_text is None else numbers(point_text) for point_text in (point, pivot)]
+    if show is None and positions == [None, None]:
         return ()
-    return outputs("" if show is None else show, *places)
+    return outputs("" if show is None else show, *positions)
 
 
 def _warn_of_cost(precision: str, integrator: str) -> None:
@@ -330,8 +330,8 @@ def _warn_of_cost(precision: str, integrator: str) -> None:
         )
 
 
-def _part_of(times: list[str], reach: Callable[[float], None]) -> Callable[[Fraction], None]:
-    """A function of the times reached on the way to the last of ``times``, for a bar that hears of parts."""
+def _fraction_of(times: list[str], reach: Callable[[float], None]) -> Callable[[Fraction], None]:
+    """A function of the time reached, which reports its fraction of the last of ``times`` to a progress bar."""
 
     def reached(time: Fraction) -> None:
         end = farthest(times)
@@ -340,22 +340,22 @@ def _part_of(times: list[str], reach: Callable[[float], None]) -> Callable[[Frac
     return reached
 
 
-class _Watch:
-    """How far a reference has come: a closed form takes no time to speak of, an enclosure goes from 0 to each time."""
+class _Progress:
+    """The progress of a reference: negligible time for a closed form, an enclosure proceeds from 0 to each time."""
 
     def __init__(self, times: list[str]) -> None:
         self.times = times
         self.solution: Any = None
 
     def find(self, top: Any, start: Any, system: Any, effort: float) -> Any:
-        """The known motion, which is watched from now on."""
+        """The known motion, whose progress is reported from now on."""
         from heavytop.exact.catalogue import find
 
         self.solution = find(top, start, system, effort)
         return self.solution
 
     def fraction(self) -> float:
-        """Part of the span that is enclosed."""
+        """The enclosed fraction of the time span."""
         reached = getattr(self.solution, "reached", None)
         last = abs(farthest(self.times))
         return float(reached() / last) if reached is not None and last else 0.0
@@ -367,9 +367,9 @@ def _motion(
     system: str | None,
     normalize: bool,
 ) -> Any:
-    """The exact top or body, the start and the name of the system; what no rigid body has is a warning.
+    """The exact top or body, the start and the name of the system; warns of moments that no rigid body has.
 
-    texts: the options, by the keys of a plan.  case: in place of them.
+    texts: the options by the keys of a plan.  case: replaces them.
     """
     if case is None:
         from heavytop.top.bodies import motion_of
@@ -384,16 +384,16 @@ def _motion(
 
 
 def _value(key: str, text: str | None) -> Any:
-    whole = ("weight", "mass", "gravity", "about", "euler", "axis_angle", "file", "link")
-    return text if text is None or key in whole else numbers(text)
+    undivided = ("weight", "mass", "gravity", "about", "euler", "axis_angle", "file", "link")
+    return text if text is None or key in undivided else numbers(text)
 
 
-def _of_case(name: str, system: str | None, others: list[str]) -> Any:
-    """Body, start and system of a case; raises InputError where options say them too."""
+def _of_case(name: str, system: str | None, data_options: list[str]) -> Any:
+    """Body, start and system of a case; raises InputError if options give them too."""
     from heavytop.cases import case
 
-    if others:
-        raise InputError(f"--case {name} and --{others[0].replace('_', '-')} were given.", "Give one of them.")
+    if data_options:
+        raise InputError(f"--case {name} and --{data_options[0].replace('_', '-')} were given.", "Give one of them.")
     named = case(name)
     if system not in (None, named.system.name):
         raise InputError(f"The case {name} is of the system {named.system.name}, not {system}.", "Leave --system out.")

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from heavytop.api.run_folder import FinishedRun, PlannedRun
 
 _REPORT_SECONDS = 0.1
-"""Expected of reading one."""
+"""Expected seconds to read a report."""
 
 
 @command
@@ -68,7 +68,7 @@ def compare(
 
 
 def write_comparison(comparison: Comparison, markdown: Path | None, junit: Path | None, html: Path | None) -> None:
-    """The files of a comparison that are asked for, all of them or none."""
+    """Write the requested files of a comparison, all of them or none."""
     files: list[tuple[Path, str]] = []
     if html is not None:
         files.append((html, comparison.to_html()))
@@ -151,7 +151,7 @@ def show(
 
 
 def _print(report: Path, full: bool, json: bool) -> None:
-    """The summary of a report, in short, in full, or as JSON."""
+    """Print the summary of a report, in short, in full, or as JSON."""
     from heavytop.features.kinds import KINDS
     from heavytop.report.render import text as overview
     from heavytop.report.render.export import to_json
@@ -232,9 +232,9 @@ def run(
     from heavytop.harness.plan import former
     from heavytop.report.store.store import FILE as REPORT
 
-    asked = prepare(
+    planned = prepare(
         plan,
-        # whatever an integrator does to the working directory
+        # an integrator may change the working directory
         None if out is None else absolute(out),
         resume=resume,
         workers=workers,
@@ -245,17 +245,17 @@ def run(
         with_parquet=parquet,
         row_timeout=row_timeout,
     )
-    directory = asked.directory
+    directory = planned.directory
     say_former({integrator} | former(plan))
-    for warning in asked.warnings:
+    for warning in planned.warnings:
         say(f"warning: {warning}")
-    if asked.is_finished:
-        ended = asked.finished()
+    if planned.is_finished:
+        ended = planned.finished()
         print(ended.summary)
         print(f"\nReport: {directory / REPORT} (was finished already)")
         return ExitCode.GOOD if ended.good else ExitCode.INCOMPLETE
     began = perf_counter()
-    ended = measured(asked)
+    ended = measured(planned)
     print(ended.summary)
     page = directory / PAGE
     print(f"\nMade in {perf_counter() - began:.0f} s. Every row: heavytop show {directory} --full")
@@ -265,7 +265,7 @@ def run(
 
 
 def measured(planned: PlannedRun) -> FinishedRun:
-    """The end of a run; one that is interrupted says what is kept, and exits."""
+    """The finished run; an interrupted one prints what is kept, and exits."""
     from heavytop.features.kinds import KINDS
     from heavytop.harness.checkpoint import FILE as ROWS
 
@@ -284,7 +284,7 @@ class _Terminated(KeyboardInterrupt):
 
 @contextmanager
 def _stopped_by_signals() -> Iterator[None]:
-    """SIGINT and SIGTERM are exceptions, so that what is finished is kept and said."""
+    """Turn SIGINT and SIGTERM into exceptions, so that finished rows are kept and reported."""
 
     def terminate(*_: object) -> None:
         raise _Terminated
