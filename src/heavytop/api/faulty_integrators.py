@@ -1,7 +1,7 @@
-"""Deliberately faulty integrators: heyoka with one planted fault each, plug-ins that `heavytop selftest` measures.
+"""Deliberately faulty integrators: plug-ins of heyoka with one planted fault each, which `heavytop selftest` measures.
 
-They hide the fault: problem and flags that they return are the healthy ones, and so is their name.  A plan measures
-them as any integrator that is defined outside the registry.  All are for the system `heavy_top` in double.
+They hide the fault: the returned problem, flags and name are those of the healthy integrator.  A plan measures them
+like any third-party integrator.  All are for the system `heavy_top` in double.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 
-class _OneByOne(Stepper):
-    """Steps taken singly, each followed by what is wrong."""
+class _SingleSteps(Stepper):
+    """A stepper that takes single steps, and spoils the state after each."""
 
     def _steps_short_of(self, target: Any) -> int:
         return 1
@@ -38,11 +38,11 @@ class _OneByOne(Stepper):
         return outcome
 
     def spoil(self) -> None:
-        """Do something to the engine after a step."""
+        """Apply the fault to the engine after a step."""
 
 
-class _OneOrderLess(_OneByOne):
-    """The last Taylor coefficient is dropped; the step stays as long as it was."""
+class _OneOrderLess(_SingleSteps):
+    """A stepper without the last Taylor coefficient, at an unchanged step size."""
 
     def polynomial(self) -> Any:
         return super().polynomial()[:, :-1]
@@ -55,8 +55,8 @@ class _OneOrderLess(_OneByOne):
         return numpy.polynomial.polynomial.polyval(tau, self.polynomial().T)
 
 
-class _ClockInOneWord(_OneByOne):
-    """The time is summed in one double, where heyoka keeps two."""
+class _ClockInOneWord(_SingleSteps):
+    """A stepper that sums the time in one double instead of heyoka's two."""
 
     def spoil(self) -> None:
         self.engine.time = self.engine.dtime[0]
@@ -64,12 +64,12 @@ class _ClockInOneWord(_OneByOne):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fault:
-    """heyoka in double, and what is wrong with it.
+    """heyoka in double with a planted fault.
 
-    options: those of `engines.compiled` that differ.  top: what is integrated in the place of the one asked for.
-    stepping: how steps are taken.  states: what is returned in the place of the states.  stops: the part of the
-    samples that is reached; silent: the run says nothing of having stopped.  detectable: whether the suite's detectors
-    are known to see it.
+    options: those of `engines.compiled` that differ.  top: maps the requested top to the integrated one.
+    stepping: the class of the stepper.  states: maps the states to those returned.  stops: the fraction of the samples
+    that is reached; silent: whether the run does not report the stop.  detectable: whether the detectors of the suite
+    are known to find it.
     """
 
     about: str
@@ -99,14 +99,14 @@ class Fault:
         xi: Sequence[Fraction] | None = None,
         observer: Observer | None = None,
     ) -> Trajectory:
-        """As :func:`heavytop.integrate.heyoka.motions.propagate`; the states go to the observer alone, if there is one.
+        """Integrate like :func:`heavytop.integrate.heyoka.motions.propagate`; an observer alone gets the states.
 
-        Raises InputError for another system, and where an attitude is asked for.
+        Raises InputError for another system, and if an attitude is requested.
         """
         if xi is not None:
             raise InputError("A planted fault has no attitude.", "Leave out the attitude.")
         reached = times[: int(len(times) * self.stops)]
-        run = motions.propagate(self.top(top), start, reached, precision, **self._how(system))
+        run = motions.propagate(self.top(top), start, reached, precision, **self._options(system))
         states = self.states(run.states)
         if observer is not None:
             for time, state in zip(run.times, states, strict=True):
@@ -118,13 +118,13 @@ class Fault:
     def first_steps(
         self, top: HeavyTop, start: State, until: Fraction, precision: Precision = DOUBLE, *, system: System = HEAVY_TOP
     ) -> tuple[Trajectory, list[TaylorStep]]:
-        """As :func:`heavytop.integrate.heyoka.motions.first_steps`; hands over what :meth:`propagate` does."""
-        run, steps = motions.first_steps(self.top(top), start, until, precision, **self._how(system))
+        """Integrate like :func:`heavytop.integrate.heyoka.motions.first_steps`, with the fault of :meth:`propagate`."""
+        run, steps = motions.first_steps(self.top(top), start, until, precision, **self._options(system))
         ends = self.states([step.end for step in steps])
         steps = [replace(step, end=end) for step, end in zip(steps, ends, strict=True)]
         return self._disguised(run, top, start), steps
 
-    def _how(self, system: System) -> dict[str, Any]:
+    def _options(self, system: System) -> dict[str, Any]:
         if system is not HEAVY_TOP:
             raise InputError(f"The planted faults are not for {system.name}.", "Use heavy_top.")
         return self.options | {"stepping": self.stepping}
@@ -134,7 +134,7 @@ class Fault:
         return replace(run, problem=healthy, flags=compiled(HEAVY_TOP, DOUBLE).flags)
 
 
-_OFF = 1 + Fraction(1, 10**10)
+_PERTURBED = 1 + Fraction(1, 10**10)
 FAULTS = {
     "sign": Fault(
         "P γ × r enters (1.1) with the other sign",
@@ -142,7 +142,7 @@ FAULTS = {
     ),
     "coefficient": Fault(
         "I1 is larger by 1e-10 of itself",
-        top=lambda top: HeavyTop((top.inertia[0] * _OFF, *top.inertia[1:]), top.weight, top.centre),
+        top=lambda top: HeavyTop((top.inertia[0] * _PERTURBED, *top.inertia[1:]), top.weight, top.centre),
     ),
     "tolerance": Fault("tolerance 1e-9", options={"tolerance": Fraction(1, 10**9)}),
     "order": Fault("one order less, at heyoka's own step", stepping=_OneOrderLess),

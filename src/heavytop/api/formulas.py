@@ -34,7 +34,7 @@ _COMMAND = re.compile(rf"\\(?:t?frac{_GROUP}|(sqrt)|(?:text|mathrm|mathrel)){_GR
 
 
 def plain_formula(tex: str) -> str:
-    r"""A displayed formula as text, without LaTeX: a line for each of its lines and columns (``\\``, ``\qquad``)."""
+    r"""A displayed formula as plain text: a line for each of its lines and columns (``\\``, ``\qquad``)."""
     for pattern, symbol in _SYMBOLS.items():
         tex = re.sub(pattern, symbol, re.sub(r"\\\\|\\qquad", "\n", tex))
     while _COMMAND.search(tex):  # the innermost group first

@@ -1,4 +1,4 @@
-"""The gate: a plan measured into a folder, compared with a committed baseline, which moves when it is blessed."""
+"""The gate: the report of a plan, compared with a committed baseline, which --bless replaces."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ MESSAGE = "message.txt"
 
 
 def require_baseline(baseline: Path, remedy: str) -> None:
-    """Raises InputError where the folder holds no report; remedy: the command that makes it."""
+    """Raise InputError if the folder has no report; remedy: the command that makes it."""
     if not any((baseline / name).exists() for name in (FILE, f"{FILE}.gz")):
         raise InputError(f"{baseline} holds no baseline.", f"Make it, and commit it: {remedy}")
 
 
 def clear(folder: Path) -> None:
-    """Remove a former report from its folder, where that holds nothing else."""
+    """Remove a former report from its folder if that contains nothing else."""
     content = list(folder.iterdir()) if folder.is_dir() else []
     if all(is_written(path.name) or path.name in (MESSAGE, f"{FILE}.gz") for path in content):
         for path in content:
@@ -32,17 +32,17 @@ def clear(folder: Path) -> None:
 
 
 def policy_of(plan: str, policy: Path | None) -> Path | None:
-    """The policy that is named, else ``policy.toml`` beside the plan where there is one."""
-    beside = Path(plan).parent / "policy.toml"
-    return policy or (beside if Path(plan).suffix == ".toml" and beside.exists() else None)
+    """The given policy, else ``policy.toml`` in the folder of the plan if it exists."""
+    default = Path(plan).parent / "policy.toml"
+    return policy or (default if Path(plan).suffix == ".toml" and default.exists() else None)
 
 
 def bless(measured: Path, baseline: Path, summary: str, comparison: Comparison | None) -> str:
     """Make the report in ``measured`` the baseline, without its page; returns the text of a commit message.
 
     The text, with the old and the new numbers of each row that changed, is written to ``measured`` too.  summary: of
-    the report.  comparison: with the former baseline; None where that is missing or cannot be read.  Raises InputError
-    where a folder cannot be written.
+    the report.  comparison: with the former baseline; None if that is missing or unreadable.  Raises InputError if
+    a folder cannot be written.
     """
     text = f"Begin the baseline of accuracy\n\n{summary}\n" if comparison is None else _moved(comparison)
     replace(measured / MESSAGE, text.encode())
@@ -55,7 +55,7 @@ def bless(measured: Path, baseline: Path, summary: str, comparison: Comparison |
 
 
 def _moved(comparison: Comparison) -> str:
-    """The commit message of a baseline that moves: verdict, findings, and a line for each row that changed."""
+    """The commit message of a new baseline: verdict, findings, and a line for each changed row."""
     lines = [f"Move the baseline of accuracy: {comparison.verdict}", "", f"{headline(comparison)}."]
     lines += [f"- {sentence}" for sentence in comparison.sentences]
     rows = [f"{change.verdict.value}: {row_name(change.identity)}: {line(change)}" for change in comparison.rows]

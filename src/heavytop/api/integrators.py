@@ -1,4 +1,4 @@
-"""Integrators of one's own, from Python: their contract, and a folder to begin with."""
+"""New integrators, from Python: checks of their contract, and a starter folder."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class Language(NamedTuple):
-    """A language of `heavytop new`: what the program is called and started by, and what is done to build it."""
+    """A language of `heavytop new`: title, source file, command and build command of the program."""
 
     title: str
     file: str
@@ -44,7 +44,7 @@ LANGUAGES = {
 
 
 class Method(NamedTuple):
-    """A method of `heavytop new`: what it is called, the keys of its table, its control and points in the plan."""
+    """A method of `heavytop new`: title, keys of its table, control parameter, and points of the plan."""
 
     title: str
     keys: str
@@ -73,7 +73,7 @@ _WORKFLOW = ".github/workflows/heavytop.yml"
 
 
 def check_integrator(integrator: str | Callable[..., Any]) -> list[Checked]:
-    """The answers of an integrator to every request of the contract, odd ones too.
+    """Check an integrator with every request of the contract, including edge cases.
 
     Arguments:
         integrator: a name that `heavytop list` shows, a file ("mine.toml", "./mine.py:solve") or a callable.
@@ -82,7 +82,7 @@ def check_integrator(integrator: str | Callable[..., Any]) -> list[Checked]:
         A list of ``Checked``: ``check``, ``verdict`` ("kept", "violated" or "note") and ``text``, a sentence.
 
     Raises:
-        InputError: for an unknown integrator, and a file that describes none.
+        InputError: for an unknown integrator, and a file without one.
     """
     from heavytop.harness.integrator_check import check
 
@@ -94,10 +94,10 @@ def new_integrator(
 ) -> list[str]:
     """Write a program that integrates, with its gate, into a new folder; returns the names of the files in it.
 
-    method: a fixed step, an adaptive one, or a multistep method.  into: a repository that ``folder`` lies in, which is
-    given the workflow.  engine: in the place of a program the adapter of that engine of rigid bodies.
-    Raises InputError for an unknown language, method or engine, a folder that holds anything, a workflow that exists,
-    and what cannot be written.
+    method: a fixed step, an adaptive one, or a multistep method.  into: a repository that contains ``folder`` and
+    gets the workflow.  engine: write the adapter of that rigid-body engine instead of a program.
+    Raises InputError for an unknown language, method or engine, a folder that is not empty, an existing workflow, and
+    files that cannot be written.
     """
     for name, choices, noun in ((language, LANGUAGES, "language"), (method, METHODS, "method")):
         if name not in choices:
@@ -139,12 +139,12 @@ def _program(language: str, method: str, folder: str) -> dict[str, str]:
 
 
 def _filled(text: str, words: dict[str, str], folder: str) -> str:
-    """A text with its words in capitals replaced.  place: the folder of the program in the repository."""
+    """A text with its words in capitals replaced.  folder: of the program in the repository."""
     words = words | {"MADE_FROM": (commit() or "HEAD").removesuffix("-dirty"), "WHERE": folder}
     return re.sub(rf"(?<![A-Za-z])({'|'.join(words)})(?![A-Za-z])", lambda match: words[match[1]], text)
 
 
-# Engines of rigid bodies, as features have adapters of them: NAME.toml, NAME_top.py, and what these share.
+# Adapters of rigid-body engines in features: NAME.toml, NAME_top.py, and a shared module.
 
 
 def engines() -> list[str]:
@@ -158,14 +158,14 @@ def _adapters() -> list[Traversable]:
 
 
 def _adapter(engine: str, folder: str) -> dict[str, str]:
-    """The files of an engine: the gate measures each of its integrators."""
-    own = {"engine.toml": f"{engine}.toml", **{name: name for name in (f"{engine}_top.py", "heavytop_engine.py")}}
+    """The files of an engine, with a gate for each of its integrators."""
+    sources = {"engine.toml": f"{engine}.toml", **{name: name for name in (f"{engine}_top.py", "heavytop_engine.py")}}
     texts = {path.name: path.read_text("utf-8") for path in _adapters()}
-    files = {name: texts[source] for name, source in own.items()}
+    files = {name: texts[source] for name, source in sources.items()}
     tables = tomllib.loads(files["engine.toml"])["integrator"]
     line = '    {{ integrator = "{name}", {setting}s = {points} }},'
     points = (_POINTS["first order" if table.get("order") == 1 else table["setting"]] for table in tables)
-    curves = (line.format(**table, points=json.dumps(own)) for table, own in zip(tables, points, strict=True))
+    curves = (line.format(**table, points=json.dumps(values)) for table, values in zip(tables, points, strict=True))
     runs = "\n".join(_DRIFT.format(name=table["name"]) for table in tables)
     words = {"ENGINE": engine, "LADDERS": "\n".join(curves), "DRIFTS": runs, "FIRST": tables[-1]["name"]}
     words["INSTALL"] = files["engine.toml"].partition(": ")[2].partition("\n")[0]
@@ -178,7 +178,7 @@ def _adapter(engine: str, folder: str) -> dict[str, str]:
 
 _POINTS = {
     "step": ["1/50", "1/100", "1/200", "1/400"],
-    "first order": ["1/500", "1/1000", "1/2000", "1/4000"],  # from two digits on a mistake can be named
+    "first order": ["1/500", "1/1000", "1/2000", "1/4000"],  # a mistake can be identified from two digits on
     "tolerance": ["1e-4", "1e-6", "1e-8", "1e-10"],
 }
 _DRIFT = """
@@ -192,18 +192,18 @@ runs = [{{ precision = "double", horizon = "10", samples = 50 }}]"""
 
 
 def _texts(part: str) -> dict[str, str]:
-    """The files of that part, by name."""
+    """The texts of the starter files of a part, by name."""
     folder = resources.files("heavytop.api") / "starters" / part
     return {file.name.removesuffix(".txt"): file.read_text("utf-8") for file in folder.iterdir() if file.is_file()}
 
 
-# What there is to choose from.
+# Lists of cases, formats and integrators.
 
 
 def listing(checked: bool = True) -> dict[str, Any]:
-    """Cases, bodies, plans, systems, formats, integrators and what these can do, as `list --json` prints them.
+    """Cases, bodies, plans, systems, formats, and integrators with their capabilities, as `list --json` prints them.
 
-    checked: whether the formats are those of the heyoka that is installed, which is loaded for it.
+    checked: whether the formats are checked with the installed heyoka, which is imported.
     """
     from heavytop.cases import CASES, described_bodies
     from heavytop.harness import BUILT_IN
@@ -244,7 +244,7 @@ def _listed(name: str, system: System, about: str, top: HeavyTop) -> dict[str, A
 
 
 def case_document(name: str) -> dict[str, Any]:
-    """The data of a case, and the text of them in every form that is read, as `list --case NAME --json` prints them.
+    """The data of a case, and their text in every input format, as `list --case NAME --json` prints them.
 
     Raises InputError for an unknown name.
     """

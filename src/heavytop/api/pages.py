@@ -1,4 +1,4 @@
-"""The pages of the documentation as text, from an installed wheel as from a checkout."""
+"""The pages of the documentation as text, from an installed wheel or a checkout."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from heavytop.api.formulas import plain_formula
 from heavytop.errors import InputError, meant, quoted
 
 _INSTALLED = Path(__file__).parents[1] / "docs"
-"""Where hatch_build.py puts the pages of a wheel."""
+"""The folder in which hatch_build.py stores the pages of a wheel."""
 _CHECKOUT = Path(__file__).parents[3] / "docs"
 _OF_THE_SITE = frozenset({"api", "audited-claims", "command-line", "contributing", "gallery", "index"})
-"""Pages that are made when the site is built."""
+"""Pages generated with the site."""
 _TABLE = "(The site has a table here; the command above prints its numbers.)\n"
 
 
 def topics() -> dict[str, str]:
-    """The title of each page, by the name of its file; raises InputError where no page is installed."""
+    """The title of each page by the name of its file; raises InputError if no page is installed."""
     return {name: _title(path.read_text("utf-8")) for name, path in sorted(_files().items())}
 
 
 def page(topic: str) -> str:
-    """The page in Markdown, formulas as text, without tables that the site makes; raises InputError for no page."""
+    """A page in Markdown, with formulas as text and without tables of the site; raises InputError for another topic."""
     files, name = _files(), topic.removeprefix("docs/").removesuffix(".md")
     if name not in files:
         remedy = meant(name, files) + "`heavytop docs` lists the topics."

@@ -1,8 +1,8 @@
-"""Pictures of motions, by matplotlib: axes in, axes out.
+"""Pictures of motions on axes of matplotlib.
 
-Every function draws on the ``axes`` that it is given, or on new ones of a figure of its own (``axes.figure``), and
-gives the axes back; none touches pyplot or the settings of the process.  Motions are what :func:`heavytop.propagate`
-and :func:`heavytop.reference` return; the denser their times, the smoother the curves.
+Every function draws on the given ``axes``, or on those of a new figure (``axes.figure``), and returns them; none uses
+pyplot or changes settings of the process.  Motions are results of :func:`heavytop.propagate` and
+:func:`heavytop.reference`; the denser their times, the smoother the curves.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ _FOLLOWED = {"centre": "centre of mass", "vertical": "vertical in the body"} | {
     f"axis{i}": f"axis {i}" for i in (1, 2, 3)
 }
 _SPAN = 100
-"""Times whose largest is so many times the first stand on a logarithmic axis."""
+"""The axis of times is logarithmic if the largest is so many times the smallest."""
 _DASHES = ("-", "--", "-.", ":", (0, (6, 2)), (0, (1, 2)))
 
 
@@ -97,8 +97,8 @@ def sphere(
         colour, label: of the path.
 
     Returns:
-        The axes; the third component is upwards, the part behind the sphere is thin, and a dot is where the path
-        begins.
+        The axes; the third component points up, the part behind the sphere is thin, and a dot marks the start of the
+        path.
 
     Raises:
         InputError: for fewer than two samples, states that are not finite, and a reference without attitude.
@@ -154,7 +154,7 @@ def polhode(
 
 
 def _free(run: Motion, top: HeavyTop | None) -> Parameters | None:
-    """The parameters of a free body; None of one with weight or rotor, and where they are not known."""
+    """The parameters of a free body; None if it has weight or a rotor, or they are unknown."""
     p = parameters_of(run, top) if isinstance(run, Trajectory) or top is not None else None
     return None if p is None or any(p.moment) or any(p.rotors) else p
 
@@ -167,7 +167,7 @@ def herpolhode(
     colour: str = COLOURS[0],
     label: str | None = None,
 ) -> Axes3D:
-    """The path of Ω in space, the herpolhode, seen along the angular momentum of a free body, else from above.
+    """The path of Ω in space, the herpolhode, viewed along the angular momentum of a free body, else from above.
 
     Arguments:
         run: a motion; without attitude a computed one is integrated again with it.
@@ -239,12 +239,12 @@ def poincare(
     colours: Sequence[str] = COLOURS,
     size: float | None = None,
 ) -> Axes:
-    """A Poincaré section: the states at the events of several motions, a colour each.
+    """A Poincaré section: the states at the events of several motions, one colour per motion.
 
     Arguments:
-        section: what :func:`heavytop.poincare` or :func:`heavytop.events` returns, or several of the latter.
+        section: a result of :func:`heavytop.poincare` or :func:`heavytop.events`, or several of the latter.
         x, y: "omega1" to "gamma3".  axes: plane axes, or None.
-        colours: taken in turn.  size: of a point, in points; None for one that suits their number.
+        colours: used cyclically.  size: of a point, in points; None for a size that depends on their number.
 
     Returns:
         The axes.
@@ -276,14 +276,14 @@ def poincare(
 
 
 def drift(run: Trajectory, axes: Axes | None = None) -> Axes:
-    """How far the first integrals of a computed motion are from their value at t = 0, over time.
+    """The drift of the first integrals of a computed motion from their values at t = 0, over time.
 
     Arguments:
         run: a computed motion, in any format.  axes: plane axes, or None.
 
     Returns:
-        The axes, with a curve for each integral that the motion has; none where it is exactly 0. Of more than
-        400 samples every nth is drawn, exactly as it is.
+        The axes, with a curve for each first integral of the motion, interrupted where the drift is exactly 0.  Of more
+        than 400 samples a subset is drawn.
 
     Raises:
         InputError: for a reference, whose integrals do not drift, and as :func:`sphere`.
@@ -291,9 +291,9 @@ def drift(run: Trajectory, axes: Axes | None = None) -> Axes:
     if not isinstance(run, Trajectory):
         raise InputError(f"run must be a computed motion; got {quoted(run)}.", "Give what heavytop.propagate returns.")
     samples(run)
-    places = every(len(run.states))
-    drawn, times = _flat(axes), np.array([float(exact(run.times[index])) for index in places])
-    curves = sample_drifts(run.problem, [exact(run.times[index]) for index in places], exact_states(run, places))
+    indices = every(len(run.states))
+    drawn, times = _flat(axes), np.array([float(exact(run.times[index])) for index in indices])
+    curves = sample_drifts(run.problem, [exact(run.times[index]) for index in indices], exact_states(run, indices))
     _logarithmic(drawn, times, {name.replace("_", " "): logs for name, logs in curves.items()})
     drawn.set_ylabel("|I(t) − I(0)|")
     drawn.set_title(f"drift in {run.problem.precision.name}, {run.integrator}", fontsize="medium")
@@ -316,14 +316,14 @@ def digits(
         InputError: where the times differ, and as :func:`sphere`.
     """
     problem, times, states, truth = compared(run, known)
-    most = problem.precision.bits * np.log10(2)
+    format_digits = problem.precision.bits * np.log10(2)
     logs = sample_errors(problem, times, states, truth)["relative"]
-    right = [most if log is None else float(np.clip(-log, 0, most)) for log in logs]
+    right = [format_digits if log is None else float(np.clip(-log, 0, format_digits)) for log in logs]
     drawn, instants = _flat(axes), np.abs(np.array([float(time) for time in times]))
     drawn.plot(instants, right, color=colour, lw=_WIDTH, label=label)
     drawn.set_title(f"{problem.precision.name}, {run.integrator}", fontsize="medium")
     _time_axis(drawn, instants)
-    drawn.set(ylabel="digits right", ylim=(0, max(most * 1.05, drawn.get_ylim()[1])))
+    drawn.set(ylabel="digits right", ylim=(0, max(format_digits * 1.05, drawn.get_ylim()[1])))
     return drawn
 
 
@@ -358,16 +358,16 @@ def animate(
     fps: int = 24,
     colour: str = COLOURS[0],
 ) -> FuncAnimation:
-    """The motion as a film: the principal axes of the body, and the path of one of them on the unit sphere.
+    """An animation of the motion: the principal axes of the body, and the path of one of them on the unit sphere.
 
     Arguments:
         run, of, top: as in :func:`sphere`.
-        path: a file to save it in, .gif (with Pillow) or .mp4 (where ffmpeg is); None for none.
-        frames: evenly over the samples, at most as many as there are.  fps: frames a second.
+        path: a file to write, .gif (with Pillow) or .mp4 (with ffmpeg); None for none.
+        frames: evenly over the samples, at most one per sample.  fps: frames per second.
         colour: of the path.
 
     Returns:
-        A ``FuncAnimation`` of matplotlib; in a notebook ``HTML(found.to_jshtml())`` shows it.
+        A ``FuncAnimation`` of matplotlib; in a notebook ``HTML(film.to_jshtml())`` shows it.
 
     Raises:
         InputError: for another kind of file, for .mp4 without ffmpeg, and as :func:`sphere`.
@@ -386,10 +386,10 @@ def animate(
     trace = drawn.plot([], [], [], color=colour, lw=_WIDTH)[0]
     clock = drawn.text2D(0.02, 0.02, "", transform=drawn.transAxes)
     drawn.legend(loc="upper left", fontsize="small", frameon=False)
-    places = every(len(line), count or 1)
+    indices = every(len(line), count or 1)
 
     def show(frame: int) -> list[Artist]:
-        index = places[frame]
+        index = indices[frame]
         for axis, arm in enumerate(arms):
             arm.set_data_3d(*np.stack([np.zeros(3), rows[index][:, axis]]).T)
         rod.set_data_3d(*np.stack([np.zeros(3), line[index]]).T)
@@ -397,9 +397,9 @@ def animate(
         clock.set_text(f"t = {locus.times[index]:.2f}")
         return [*arms, rod, trace, clock]
 
-    film = FuncAnimation(drawn.figure, show, frames=len(places), interval=1000 / (rate or 1), blit=False)
+    film = FuncAnimation(drawn.figure, show, frames=len(indices), interval=1000 / (rate or 1), blit=False)
     if file is None:
-        drawn.figure.canvas.draw()  # the first frame: matplotlib warns of a film of which nothing was drawn
+        drawn.figure.canvas.draw()  # the first frame: matplotlib warns of an animation that was never drawn
     else:
         _save(film, file, writer)
     return film
@@ -431,7 +431,7 @@ def _writer(suffix: str, fps: int) -> AbstractMovieWriter:
 
 
 def _flat(axes: Axes | None) -> Axes:
-    """Plane axes: those given, or new ones."""
+    """The given plane axes, or new ones."""
     if axes is None:
         axes = new_figure(6.4, 4.0).add_subplot()
     elif not hasattr(axes, "plot") or getattr(axes, "name", "") == "3d":
@@ -444,7 +444,7 @@ def _flat(axes: Axes | None) -> Axes:
 
 
 def _solid(axes: Axes3D | None) -> Axes3D:
-    """Three-dimensional axes: those given, or new ones."""
+    """The given three-dimensional axes, or new ones."""
     if axes is None:
         axes = new_figure(5.2, 5.0).add_subplot(projection="3d")
     elif getattr(axes, "name", "") != "3d":
@@ -455,13 +455,13 @@ def _solid(axes: Axes3D | None) -> Axes3D:
 
 
 def _sight(axes: Axes3D) -> NDArray[np.float64]:
-    """The unit vector from the middle of the axes to the eye."""
+    """The unit vector from the centre of the axes to the viewer."""
     elevation, azimuth = np.radians(axes.elev), np.radians(axes.azim)
     return np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
 
 
 def _globe(axes: Axes3D) -> None:
-    """The unit sphere, and a line upwards."""
+    """Draw the unit sphere, and a vertical line."""
     _ellipsoid(axes, np.ones(3))
     axes.plot([0, 0], [0, 0], [-1, 1.25], color=_GREY, lw=0.8)
     _equal(axes, 1.0)
@@ -471,16 +471,16 @@ def _globe(axes: Axes3D) -> None:
 
 
 def _ellipsoid(axes: Axes3D, radii: NDArray[np.float64]) -> None:
-    """A translucent ellipsoid with circles of latitude and longitude."""
-    turn, height = np.linspace(0, 2 * np.pi, 73), np.linspace(-np.pi / 2, np.pi / 2, 37)
-    across, up = np.cos(height)[:, None], np.sin(height)[:, None]
-    x, y, z = across * np.cos(turn) * radii[0], across * np.sin(turn) * radii[1], up + 0 * turn
+    """Draw a translucent ellipsoid with circles of latitude and longitude."""
+    longitude, latitude = np.linspace(0, 2 * np.pi, 73), np.linspace(-np.pi / 2, np.pi / 2, 37)
+    across, up = np.cos(latitude)[:, None], np.sin(latitude)[:, None]
+    x, y, z = across * np.cos(longitude) * radii[0], across * np.sin(longitude) * radii[1], up + 0 * longitude
     axes.plot_surface(x, y, z * radii[2], color=_LIGHT, alpha=0.15, lw=0, shade=False)
     axes.plot_wireframe(x, y, z * radii[2], rstride=6, cstride=9, color=_GREY, alpha=0.18, lw=0.5)
 
 
 def _equal(axes: Axes3D, extent: float, middle: Sequence[float] | NDArray[np.float64] = (0.0, 0.0, 0.0)) -> None:
-    """One scale on all three axes, ``extent`` to both sides of the middle."""
+    """Set equal scales on all three axes, from ``middle`` − ``extent`` to ``middle`` + ``extent``."""
     low, high = np.asarray(middle) - extent, np.asarray(middle) + extent
     for name, ends in zip("xyz", zip(low, high, strict=True), strict=True):
         getattr(axes, f"set_{name}lim")(*ends)
@@ -494,19 +494,19 @@ def _visible_path(
     label: str | None,
     weights: Sequence[float] | NDArray[np.float64] = (1.0, 1.0, 1.0),
 ) -> None:
-    """A path on an ellipsoid Σ weight x² = 1: the part that faces the eye as a line, the rest thin."""
+    """Draw a path on an ellipsoid Σ weight x² = 1; the part behind the ellipsoid is thin."""
     front = (path * np.asarray(weights)) @ _sight(axes) >= 0
-    near, far = path.copy(), path.copy()
-    # both have the sample where they meet
-    near[~(front | np.roll(front, 1))] = np.nan
-    far[front & np.roll(front, 1)] = np.nan
-    axes.plot(*far.T, color=colour, lw=0.7 * _WIDTH, alpha=0.45)
-    axes.plot(*near.T, color=colour, lw=1.2 * _WIDTH, label=label)
+    visible, hidden = path.copy(), path.copy()
+    # both parts contain the sample where they meet
+    visible[~(front | np.roll(front, 1))] = np.nan
+    hidden[front & np.roll(front, 1)] = np.nan
+    axes.plot(*hidden.T, color=colour, lw=0.7 * _WIDTH, alpha=0.45)
+    axes.plot(*visible.T, color=colour, lw=1.2 * _WIDTH, label=label)
     axes.plot(*path[:1].T, "o", color=colour, ms=4)
 
 
 def _plane_across(normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Two unit vectors at right angles to a unit vector and to each other, (2, 3)."""
+    """Two orthogonal unit vectors orthogonal to the unit vector ``normal``, (2, 3)."""
     first = np.cross(normal, np.eye(3)[int(np.argmin(abs(normal)))])
     first /= np.linalg.norm(first)
     return np.stack([first, np.cross(normal, first)])
@@ -528,7 +528,7 @@ def _named(name: str) -> str:
 
 
 def _time_axis(axes: Axes, times: NDArray[np.float64]) -> None:
-    """Logarithmic over two decades or more; sizes of times."""
+    """Label the axis of |t|, logarithmic over two decades or more."""
     positive = times[times > 0]
     if len(positive) and positive.max() >= _SPAN * positive.min():
         axes.set_xscale("log")
@@ -536,7 +536,7 @@ def _time_axis(axes: Axes, times: NDArray[np.float64]) -> None:
 
 
 def _logarithmic(axes: Axes, times: NDArray[np.float64], curves: dict[str, Logs]) -> None:
-    """Curves over time by their decimal logarithms, which may be those of numbers that no double is."""
+    """Draw curves over time from decimal logarithms, which may be beyond the range of doubles."""
     backwards = bool((times < 0).any())
     for index, (name, logs) in enumerate(curves.items()):
         values = np.array([np.nan if log is None else log for log in logs])
@@ -555,12 +555,12 @@ def stability(top: HeavyTop | Body, axes: Axes3D | None = None, *, speed: float 
     """Rotation about each principal axis on the unit sphere of the body: stable or unstable, with the rate.
 
     Arguments:
-        top: its principal axes at the fixed point; the axis is vertical where the top has a weight.
+        top: its principal axes at the fixed point; the rotation axis is vertical if the top has weight.
         axes: three-dimensional axes, or None.
         speed: Ω, 1/time unit.
 
     Returns:
-        The axes; a grey point where the rotation is not steady.
+        The axes; a grey point if the rotation is not steady.
 
     Raises:
         InputError: for an invalid top.
@@ -587,14 +587,14 @@ def stability(top: HeavyTop | Body, axes: Axes3D | None = None, *, speed: float 
 
 
 def power(test: PowerCurves, axes: Axes | None = None) -> Axes:
-    """How far each planted fault is from the true motion until each time, beside the tolerance of the test.
+    """The largest error of each planted fault up to each time, and the tolerance of the test.
 
     Arguments:
-        test: what :func:`heavytop.power` returns.
+        test: a result of :func:`heavytop.power`.
         axes: of matplotlib, or None.
 
     Returns:
-        The axes, logarithmic upwards.
+        The axes, with logarithmic errors.
     """
     drawn = _flat(axes)
     times = np.array([float(time) for time in test.times])
@@ -612,7 +612,7 @@ def between(samples: SpacedErrors | Sequence[SpacedErrors], axes: Axes | None = 
     """The error of each interpolation over the time between samples.
 
     Arguments:
-        samples: what :func:`heavytop.between_samples` returns, of one spacing or of several.
+        samples: a result of :func:`heavytop.between_samples`, or several.
         axes: of matplotlib, or None.
 
     Returns:

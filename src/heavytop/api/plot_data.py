@@ -1,4 +1,4 @@
-"""Motions as pictures need them: times, states and attitude as arrays, checked."""
+"""Data of pictures: times, states and attitude of motions as arrays, checked."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ _FEWEST = 2
 AXES = {"axis1": (1.0, 0.0, 0.0), "axis2": (0.0, 1.0, 0.0), "axis3": (0.0, 0.0, 1.0)}
 OF = (*AXES, "centre", "vertical")
 MOST_EXACT = 400
-"""Samples whose exact errors or integrals are drawn; of more every nth is."""
+"""The most samples whose exact errors or integrals are drawn; of more, a subset is."""
 
 
 @runtime_checkable
 class Crossings(Protocol):
-    """States of one motion at which a function changes sign: :func:`heavytop.events` returns such."""
+    """States of a motion at which a function changes sign, as from :func:`heavytop.events`."""
 
     @property
     def function(self) -> str: ...
@@ -42,7 +42,7 @@ class Crossings(Protocol):
 
 @runtime_checkable
 class PoincareSection(Protocol):
-    """Crossings of several motions: :func:`heavytop.poincare` returns such."""
+    """Crossings of several motions, as from :func:`heavytop.poincare`."""
 
     @property
     def events(self) -> Sequence[Crossings]: ...
@@ -58,7 +58,7 @@ class FaultCurve(Protocol):
 
 
 class PowerCurves(Protocol):
-    """A test with its planted faults: :func:`heavytop.power` returns such."""
+    """A test with its planted faults, as from :func:`heavytop.power`."""
 
     @property
     def times(self) -> Sequence[Fraction]: ...
@@ -69,7 +69,7 @@ class PowerCurves(Protocol):
 
 
 class SpacedErrors(Protocol):
-    """Errors between samples: :func:`heavytop.between_samples` returns such."""
+    """Errors between samples, as from :func:`heavytop.between_samples`."""
 
     @property
     def spacing(self) -> Fraction: ...
@@ -79,7 +79,7 @@ class SpacedErrors(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """times: (n,).  omega, gamma: (n, 3), in body axes."""
+    """The samples of a motion in double.  times: (n,).  omega, gamma: (n, 3), in body axes."""
 
     run: Motion
     times: NDArray[np.float64]
@@ -89,7 +89,7 @@ class Samples:
     def rotations(self) -> NDArray[np.float64]:
         """R at every sample, (n, 3, 3), v_space = R v_body.
 
-        A computed motion without attitude is run again with it; raises InputError for a known one.
+        A computed motion without attitude is integrated again with it; raises InputError for a known one without it.
         """
         run = self.run
         if isinstance(run, Reference):
@@ -102,7 +102,7 @@ class Samples:
 
 
 def samples(run: Any) -> Samples:
-    """A motion in double; raises InputError for an invalid one, for fewer than two samples, and for ones not finite."""
+    """A motion in double; raises InputError unless it has two samples or more, all finite."""
     if not isinstance(run, Trajectory | Reference):
         raise InputError(
             f"run must be a motion; got {quoted(run)}.", "Give what heavytop.propagate or heavytop.reference returns."
@@ -122,7 +122,7 @@ def samples(run: Any) -> Samples:
 
 
 def _with_attitude(run: Trajectory) -> Trajectory:
-    """The motion with its attitude, integrated again for it."""
+    """The motion integrated again, with its attitude."""
     problem = run.problem
     top, start = problem.given or (problem.top, problem.start)
     start = start.normalized()
@@ -145,15 +145,15 @@ def _with_attitude(run: Trajectory) -> Trajectory:
 
 
 def axes_of(run: Motion) -> NDArray[np.float64] | None:
-    """A, v_given = A v_principal, of a run whose states are in other axes than the principal ones; else None."""
+    """A, v_given = A v_principal, of a run with states in other axes than the principal ones, else None."""
     frame = getattr(run, "frame", None)
     return None if frame is None else np.array([[float(value) for value in row] for row in frame.axes])
 
 
 def principal(run: Motion, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     """Vectors (n, 3) of a run in its principal axes."""
-    turn = axes_of(run)
-    return vectors if turn is None else vectors @ turn
+    rotation = axes_of(run)
+    return vectors if rotation is None else vectors @ rotation
 
 
 def parameters_of(run: Motion, top: HeavyTop | None) -> Parameters:
@@ -166,7 +166,7 @@ def parameters_of(run: Motion, top: HeavyTop | None) -> Parameters:
 
 
 def direction(run: Motion, of: str | None, top: HeavyTop | None) -> tuple[str, NDArray[np.float64]]:
-    """(name, unit vector in body axes) of what is followed in space; None: the centre of mass, else axis 3."""
+    """(name, unit vector in body axes) of the body direction ``of``; None for the centre of mass, else axis 3."""
     if of is None:
         known = isinstance(run, Trajectory) or top is not None
         of = "centre" if known and any(parameters_of(run, top).moment) else "axis3"
@@ -179,8 +179,8 @@ def direction(run: Motion, of: str | None, top: HeavyTop | None) -> tuple[str, N
         raise InputError("The centre of mass is at the fixed point, or has no weight.", "Use axis1, axis2 or axis3.")
     largest = max(map(abs, moment))
     vector = np.array([float(value / largest) for value in moment])
-    turn = axes_of(run)
-    return of, (vector if turn is None else turn @ vector) / np.linalg.norm(vector)
+    rotation = axes_of(run)
+    return of, (vector if rotation is None else rotation @ vector) / np.linalg.norm(vector)
 
 
 def path_in_space(run: Any, of: str | None, top: HeavyTop | None) -> tuple[str, Samples, NDArray[np.float64]]:
@@ -196,7 +196,7 @@ def path_in_space(run: Any, of: str | None, top: HeavyTop | None) -> tuple[str, 
 
 
 def compared(run: Any, known: Any) -> tuple[Problem, list[Fraction], list[list[Fraction]], list[list[Fraction]]]:
-    """(problem, times, states, known states), exact, every nth of many; raises InputError where the times differ."""
+    """(problem, times, states, known states), exact, of a subset of many; raises InputError if the times differ."""
     if not isinstance(run, Trajectory):
         raise InputError(f"run must be a computed motion; got {quoted(run)}.", "Give what heavytop.propagate returns.")
     samples(run)
@@ -204,21 +204,21 @@ def compared(run: Any, known: Any) -> tuple[Problem, list[Fraction], list[list[F
     count = len(run.states)
     if count != len(known.states):
         raise InputError(f"The run has {count} samples and the other {len(known.states)}.", "Give the same times.")
-    places = every(count)
-    times = [exact(run.times[index]) for index in places]
+    indices = every(count)
+    times = [exact(run.times[index]) for index in indices]
     slack = 4 * run.problem.precision.eps
-    for time, index in zip(times, places, strict=True):
-        other = exact(known.times[index])
-        if abs(time - other) > slack * abs(time):
+    for time, index in zip(times, indices, strict=True):
+        known_time = exact(known.times[index])
+        if abs(time - known_time) > slack * abs(time):
             raise InputError(
-                f"Sample {index} is at t = {float(time)!r} of one and {float(other)!r} of the other.",
+                f"Sample {index} is at t = {float(time)!r} of one and {float(known_time)!r} of the other.",
                 "Give the same times.",
             )
-    return run.problem, times, exact_states(run, places), exact_states(known, places, run)
+    return run.problem, times, exact_states(run, indices), exact_states(known, indices, run)
 
 
 def every(count: int, most: int = MOST_EXACT) -> list[int]:
-    """The places of at most ``most`` samples of ``count``, evenly, with the first and the last."""
+    """Indices of at most ``most`` of ``count`` samples, evenly distributed, with the first and the last."""
     if count <= most:
         return list(range(count))
     if most == 1:
@@ -226,13 +226,13 @@ def every(count: int, most: int = MOST_EXACT) -> list[int]:
     return [round(n * (count - 1) / (most - 1)) for n in range(most)]
 
 
-def exact_states(run: Motion, places: Sequence[int], beside: Motion | None = None) -> list[list[Fraction]]:
-    """(Ω, γ) at these samples, exactly as they are written, in the principal axes of the run, or of that ``beside``."""
+def exact_states(run: Motion, indices: Sequence[int], framed_by: Motion | None = None) -> list[list[Fraction]]:
+    """(Ω, γ) at these indices, exact values of the printed numbers, in principal axes of the run, or ``framed_by``."""
     if isinstance(run, Reference):
-        exact_values = [[exact(ball.value) for ball in run.states[index]][:6] for index in places]
+        exact_values = [[exact(ball.value) for ball in run.states[index]][:6] for index in indices]
     else:
-        exact_values = [[exact(value) for value in run.states[index][:6]] for index in places]
-    frame = getattr(beside or run, "frame", None)
+        exact_values = [[exact(value) for value in run.states[index][:6]] for index in indices]
+    frame = getattr(framed_by or run, "frame", None)
     if frame is None:
         return exact_values
     back = transposed(frame.axes)

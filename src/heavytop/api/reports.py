@@ -39,13 +39,13 @@ class Report(Tabular, records.Report, frozen=True):
 
     @property
     def verdict(self) -> str:
-        """``complete``, or ``incomplete`` where a row failed."""
+        """``complete``, or ``incomplete`` if a row failed."""
         return "incomplete" if any(failed(row, KINDS) for row in self.rows) else "complete"
 
     def to_pandas(self) -> pandas.DataFrame:
-        """The rows as a table, a line for each metric and growth law, with the columns of `--parquet`.
+        """The rows as a table, one line per metric and growth law, with the columns of `--parquet`.
 
-        Raises InputError where pandas is not installed.
+        Raises InputError if pandas is not installed.
         """
         try:
             import pandas
@@ -56,7 +56,7 @@ class Report(Tabular, records.Report, frozen=True):
     def export(self, to: str) -> str:
         """The text of a file for another tool: ``to`` is a name that `heavytop export --help` lists, such as junit.
 
-        Of each number smaller is better: log10 of error and drift, exponents of growth laws, seconds.  Raises
+        Smaller numbers are better: log10 of error and drift, exponents of growth laws, seconds.  Raises
         InputError for another tool.
         """
         return exports.export(self, arguments.text(to, "to"), KINDS)
@@ -100,20 +100,20 @@ class Comparison(Tabular, comparing.Differences):
     reports: tuple[store.AnyReport, store.AnyReport] = field(kw_only=True, compare=False)
 
     def to_html(self) -> str:
-        """The page of `compare --html`, with both reports on the same axes; their rows are read for it."""
+        """The page of `compare --html`, with both reports on the same axes."""
         from heavytop.report.render.page import comparison_page
 
         old, new = (store.full_report(report) for report in self.reports)
         return comparison_page(old, new, self, KINDS)
 
     def to_junit(self) -> str:
-        """The document of `compare --junit`: a test case a metric."""
+        """The document of `compare --junit`: one test case per metric."""
         return exports.comparison_junit(self)
 
     def to_markdown(self, page: PathLike | None = None) -> str:
         """The text of `compare --markdown`: the findings, then a line for each row that changed.
 
-        page: the file of :meth:`to_html`, which is named at the end.
+        page: the file of :meth:`to_html`, for a link at the end.
         """
         return exports.comparison_markdown(self, None if page is None else arguments.path(page, "page"))
 
@@ -129,10 +129,10 @@ class Comparison(Tabular, comparing.Differences):
 
 @dataclass(frozen=True, repr=False)
 class History(Tabular):
-    """Metrics over reports: ``names`` of the reports, the oldest first, and ``tracks``, one a metric of a row.
+    """Metrics over reports: ``names`` of the reports, the oldest first, and ``tracks``, one per metric of a row.
 
-    A track has ``row`` and ``metric``, its ``values``, one a report and None where that has none, and ``steps``: by the
-    index of a report the verdict on the change from the one before it, with the reason; the same is left out.
+    A track has ``row``, ``metric``, ``values`` (one per report, None if missing) and ``steps``: by the index of a
+    report the verdict, other than same, on the change from the one before it, with the reason.
     """
 
     names: list[str]
@@ -140,7 +140,7 @@ class History(Tabular):
     reports: list[store.AnyReport]
 
     def to_html(self) -> str:
-        """The page of `history --html`: a small chart a metric."""
+        """The page of `history --html`: a small chart per metric."""
         return over.history_page(self.names, self.reports, self.tracks)
 
     def to_json(self) -> dict[str, Any]:
@@ -171,13 +171,13 @@ def run(
     Arguments:
         plan: one of `harness.BUILT_IN`, such as default, or the path of a TOML file (`heavytop docs plans`).
         out: a new folder; None for a new one under heavytop-results.
-        resume: go on with the rows that ``out`` already holds.
+        resume: continue the run in ``out``.
         workers: local processes; None for as many as there are processors.  No main guard is needed.
         scheduler: the address of a Dask scheduler to run on instead.
-        integrator: one that is measured beside heyoka: a name such as ``mine:name``, a file (``mine.toml``,
+        integrator: measured in addition to heyoka: a name such as ``mine:name``, a file (``mine.toml``,
             ``./mine.py:solve``), or a callable as :func:`heavytop.integrate.peers.double.double_peer` makes or takes
             it.  It runs in a process of its own.
-        seed: measure the same motions with other roundings: 0 to 1000.
+        seed: of the roundings of the same motions: 0 to 1000.
         parquet: write rows.parquet too.
         row_timeout: seconds that a row of a third-party integrator may take; None for the plan's, or limits by its
             other rows (`heavytop docs gate`).
@@ -186,10 +186,9 @@ def run(
         A :class:`Report`.  A motion that failed is a row with its outcome, not an exception.
 
     Raises:
-        InputError: for an impossible plan, a folder that is not fit or not writable, and options that contradict each
-            other.
+        InputError: for an impossible plan, a folder with other content or not writable, and contradictory options.
     """
-    asked = prepare(
+    planned = prepare(
         str(arguments.path(plan, "plan")),
         None if out is None else arguments.path(out, "out"),
         resume=bool(arguments.flag(resume, "resume")),
@@ -200,13 +199,13 @@ def run(
         with_parquet=bool(arguments.flag(parquet, "parquet")),
         row_timeout=row_timeout,
     )
-    for warning in asked.warnings:
+    for warning in planned.warnings:
         warnings.warn(warning, stacklevel=2)
-    if asked.is_finished:
-        asked.finished()
+    if planned.is_finished:
+        planned.finished()
     else:
-        asked.measure()
-    return read_report(asked.directory)
+        planned.measure()
+    return read_report(planned.directory)
 
 
 def _integrator(integrator: str | Callable[..., Any] | None) -> str | Callable[..., Any]:
@@ -225,8 +224,7 @@ def read_report(path: PathLike) -> Report:
         A :class:`Report`.
 
     Raises:
-        InputError: for a file that is missing, cut short, of another program or schema, changed since it was written,
-            or inconsistent in itself.
+        InputError: for a file that is missing, truncated, of another program or schema, modified, or inconsistent.
     """
     report = store.read(arguments.path(path, "path"), KINDS)
     return Report(report.schema, report.plan, report.environment, report.rows, report.beside)
@@ -243,17 +241,17 @@ def compare(
     """Compare two reports, row by row and metric by metric.
 
     Arguments:
-        baseline, candidate: reports, or the folders or files of two; of these the motions of surveys are joined.
+        baseline, candidate: reports, or their folders or files; for these the motions of surveys are joined.
         policy: a TOML file of what counts as the same (`heavytop docs compare`).
-        floor: errors below ``floor`` eps are all the same.
-        loss: bits that any error may grow by; 2, and a tenth of one of truncation, where it is not given.
+        floor: errors below ``floor`` eps count as equal.
+        loss: bits by which an error may grow; by default 2, and 10 % for truncation errors.
 
     Returns:
         A :class:`Comparison`; ``verdict`` is "worse" if anything is, else "incomparable" if anything is missing or
         cannot be compared, else "better" or "same".
 
     Raises:
-        InputError: for an invalid report or policy, and where there is nothing to compare.
+        InputError: for an invalid report or policy, and if there is nothing to compare.
     """
     return compared(baseline, candidate, policy, floor, loss)
 
@@ -267,7 +265,7 @@ def compared(
     list_same: bool = True,
     read: Callable[[], None] = lambda: None,
 ) -> Comparison:
-    """As :func:`compare`.  list_same: False to count what plainly stayed the same.  read: called after each report."""
+    """Compare like :func:`compare`.  list_same: False to count unchanged metrics.  read: called after each report."""
     rules = policies.Policy() if policy is None else policies.load(arguments.path(policy, "policy"))
     rules = policies.adjusted(rules, arguments.limit(floor, "floor"), arguments.limit(loss, "loss"))
     old, new = _report(baseline, "baseline", read), _report(candidate, "candidate", read)
@@ -282,7 +280,7 @@ def compared(
 
 
 def _folder(report: Path) -> Path:
-    """The folder of a report, which is it or its file."""
+    """The folder of a report, from the folder or its file."""
     return report if report.is_dir() else report.parent
 
 
@@ -296,8 +294,8 @@ def history(
     """Metrics over reports, with every step from one to the next.
 
     Arguments:
-        reports: two or more, the oldest first: reports, or the folders or files of them.
-        metric: a pattern such as ``drift_*``; without it all metrics that changed, and no others.
+        reports: two or more reports, or their folders or files, the oldest first.
+        metric: a pattern such as ``drift_*``; empty for all metrics that changed.
         case: a pattern for the cases.
         policy: a TOML file of what counts as a step (`heavytop docs compare`).
 
@@ -311,7 +309,7 @@ def history(
 
 
 def read_history(reports: Any, metric: str, case: str, policy: PathLike | None, read: Callable[[], None]) -> History:
-    """As :func:`history`; ``read`` is called after each report."""
+    """Make a history like :func:`history`; ``read`` is called after each report."""
     folders = ordered(reports, "reports", "Give a list of reports or of their folders, the oldest first.")
     if len(folders) < 2:
         raise InputError("A history needs two reports or more.", "Give their folders, the oldest first.")
@@ -328,7 +326,7 @@ def read_history(reports: Any, metric: str, case: str, policy: PathLike | None, 
 
 
 def _report(source: Any, what: str, read: Callable[[], None]) -> store.AnyReport:
-    """A report, or that of a path, whose rows are read as they are gone through; then ``read`` is called."""
+    """A report, or that of a path, whose rows are read lazily; ``read`` is called afterwards."""
     if not isinstance(source, records.Report | str | os.PathLike):
         raise InputError(f"{what} must be a report; got {quoted(source)}.", "Give a Report, or the path of one.")
     if isinstance(source, records.Report):

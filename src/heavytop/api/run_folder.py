@@ -1,4 +1,4 @@
-"""A run of a plan into a folder: what it would measure, whether the folder is fit, and the report that it leaves."""
+"""Runs of plans into folders: their tasks, checks of the folder, and the report."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ from heavytop.report.store.store import environment
 PAGE = "report.html"
 _ANOTHER = "Give another --out."
 MOST_ON_A_PAGE = 5000
-"""Beyond so many rows a run makes no page: it would hold them all."""
+"""A run with more rows makes no page, which would contain them all."""
 
 
 @dataclass(frozen=True, slots=True)
 class FinishedRun:
-    """A run that is over: its summary for people, and whether no row failed."""
+    """A finished run: its summary, and whether no row failed."""
 
     summary: str
     good: bool
@@ -51,10 +51,10 @@ class FinishedRun:
 
 @dataclass(frozen=True, slots=True)
 class PlannedRun:
-    """A run of a plan that may begin.
+    """A run of a plan, ready to start.
 
-    identity: name, hash and seed of the plan.  warnings: what is odd about the plan's own tops.
-    resume: go on with the rows that ``directory`` holds.  save_every: seconds between two places of a long row.
+    identity: name, hash and seed of the plan.  warnings: of the tops defined in the plan.
+    resume: continue with the rows in ``directory``.  save_every: seconds between checkpoints of a long row.
     row_timeout: seconds of a row of a third-party integrator; None for limits by its other rows.
     """
 
@@ -71,12 +71,12 @@ class PlannedRun:
 
     @property
     def is_finished(self) -> bool:
-        """Whether there is nothing to go on with: all rows are there and the report is written."""
+        """Whether nothing remains to be done: all rows are measured and the report is written."""
         report, rows = self.directory / store.FILE, self.directory / checkpoint.FILE
         return self.resume and report.exists() and not rows.exists()
 
     def finished(self) -> FinishedRun:
-        """The end of a run that was finished already; raises InputError where it was of another plan."""
+        """The result of a run that is finished already; raises InputError if it was of another plan."""
         report = store.read(self.directory, KINDS)
         checkpoint.require_same(report.plan, self.identity, self.directory)
         if self.parquet:
@@ -84,14 +84,14 @@ class PlannedRun:
         return FinishedRun(brief(report, report.rows, KINDS), text.all_good(report.rows, KINDS))
 
     def measure(self, progress: Progress = unheard, begun: Progress = unheard) -> FinishedRun:
-        """Measure what is not there yet, write the report and sum it up.
+        """Measure the remaining rows, write the report and summarise it.
 
-        progress, begun: hear of each task that is finished, and that begins.
-        Raises InputError where the folder is not fit or cannot be written; what is finished is kept for --resume.
+        progress, begun: called with each task that is finished, and that begins.
+        Raises InputError if the folder has other content or cannot be written; finished rows are kept for --resume.
         """
         greetings = _greetings(self.tasks)
-        said = {"integrators": {name: text for name, (text, _) in greetings.items()}} if greetings else {}
-        report = Report(SCHEMA, self.identity, environment() | said, [])
+        reported = {"integrators": {name: text for name, (text, _) in greetings.items()}} if greetings else {}
+        report = Report(SCHEMA, self.identity, environment() | reported, [])
         versions = {name: version for name, (_, version) in greetings.items()}
         tasks = [
             dataclasses.replace(task, key=task.key.of_version(versions.get(task.key.subject.name, "")))
@@ -116,7 +116,7 @@ class PlannedRun:
             ) from None
 
     def _require_own(self, rows: Checkpoint) -> None:
-        """Raises InputError where the checkpoint holds a row that no run of this plan wrote, whatever its checksum."""
+        """Raise InputError if the checkpoint has a row that no run of this plan has written."""
         indices = sorted(rows.offsets)
         for index, row in zip(indices, rows.rows(indices), strict=True):
             if index not in range(len(self.tasks)) or row.key != self.tasks[index].key:
@@ -125,28 +125,28 @@ class PlannedRun:
             check_rows(rows.path, [row], KINDS)
 
     def _reported(self, rows: Checkpoint, laws: Sequence[Row]) -> Callable[[], Iterable[Row]]:
-        """The report's rows at each call, read from the disk once unless they are too many; those
-        of kinds that gather them become fewer, and the files of these are written.
+        """A function that returns the rows of the report, read once unless they are too many; rows of kinds that gather
+        them are combined, and the files of these kinds are written.
         """
         indices = range(len(self.tasks))
         parts: dict[str, list[int]] = {}
         for index in indices:
             if KINDS[kind := self.tasks[index].key.kind].gathers:
                 parts.setdefault(kind, []).append(index)
-        rows_of_kinds = [row for kind, places in parts.items() for row in self._gathered(kind, rows, places)]
+        rows_of_kinds = [row for kind, gathered in parts.items() for row in self._gathered(kind, rows, gathered)]
         others = sorted(set(indices).difference(*parts.values()))
         if len(self.tasks) > MOST_ON_A_PAGE:
             return lambda: chain(rows.rows(others), rows_of_kinds, laws)
-        held = [*rows.rows(others), *rows_of_kinds, *laws]
-        return lambda: held
+        loaded = [*rows.rows(others), *rows_of_kinds, *laws]
+        return lambda: loaded
 
-    def _gathered(self, kind: str, rows: Checkpoint, places: list[int]) -> list[Row]:
-        """The rows of the report made of those in these places, of a kind that gathers them."""
-        tasks = [self.tasks[index] for index in places]
-        return KINDS[kind].gather(lambda: zip(tasks, rows.rows(places), strict=True), self.directory)
+    def _gathered(self, kind: str, rows: Checkpoint, indices: list[int]) -> list[Row]:
+        """The rows of the report combined from those at these indices, of a kind that gathers them."""
+        tasks = [self.tasks[index] for index in indices]
+        return KINDS[kind].gather(lambda: zip(tasks, rows.rows(indices), strict=True), self.directory)
 
     def _write(self, report: Report, rows: Callable[[], Iterable[Row]]) -> FinishedRun:
-        """Write all that a finished run leaves.  rows: all rows at each call."""
+        """Write all files of a finished run.  rows: returns all rows at each call."""
         if self.parquet:
             parquet.write(self.directory / parquet.FILE, rows(), report.plan)
         store.write(report, self.directory, rows())
@@ -171,9 +171,9 @@ def prepare(
 ) -> PlannedRun:
     """The run of a plan into the folder ``out``, by default a new one under heavytop-results; nothing is written yet.
 
-    clear: called on that folder once all else is in order.
+    clear: called with that folder once all other checks have passed.
 
-    Raises InputError for an impossible plan, a folder that is not fit, and options that contradict each other.
+    Raises InputError for an impossible plan, a folder with other content, and contradictory options.
     """
     if with_parquet:
         require_extra("parquet")
@@ -208,10 +208,10 @@ def prepare(
 
 
 def _greetings(tasks: Sequence[Task]) -> dict[str, tuple[str, str]]:
-    """By the name of each program that integrates what it says of itself, and its version in that."""
+    """(greeting, version) of each integrating program, by its name."""
     sources = {task.source for task in tasks if task.source is not None} if len(tasks) <= MOST_ON_A_PAGE else set()
-    programs = sorted((each for each in sources if isinstance(each, Command)), key=lambda each: each.name)
-    return {each.name: _greeting(each) for each in programs}
+    programs = sorted((source for source in sources if isinstance(source, Command)), key=lambda source: source.name)
+    return {program.name: _greeting(program) for program in programs}
 
 
 def _greeting(command: Command) -> tuple[str, str]:
@@ -223,13 +223,13 @@ def _greeting(command: Command) -> tuple[str, str]:
 
 
 def is_written(name: str) -> bool:
-    """Whether a run puts a file of that name into its folder."""
+    """Whether a run writes a file of that name into its folder."""
     gathered = {file for kind in KINDS.values() for file in kind.gathers}
     return name in {store.FILE, store.DIGEST, PAGE, parquet.FILE, *gathered} or bool(checkpoint.OURS.fullmatch(name))
 
 
 def require_fit(directory: Path, resume: bool) -> None:
-    """Raises InputError where the folder holds anything that a run did not put there, or all of it without --resume."""
+    """Raise InputError if the folder has other content than files of a run, or without --resume any content."""
     if not directory.exists():
         return
     if not directory.is_dir():
@@ -238,7 +238,7 @@ def require_fit(directory: Path, resume: bool) -> None:
     begun = checkpoint.FILE in content
     content -= {name for name in content if checkpoint.OURS.fullmatch(name) and (resume or name != checkpoint.FILE)}
     if resume and begun:
-        content -= {name for name in content if is_written(name)}  # written, but not yet cleared up after
+        content -= {name for name in content if is_written(name)}  # written, but the checkpoint is not yet removed
     if content:
         remedy = "Give a new folder with --out." + (" Or go on with --resume." if begun else "")
         raise InputError(f"{directory} already holds {', '.join(sorted(content)[:5])}.", remedy)

@@ -1,7 +1,7 @@
-"""The suite's own detectors, tried on deliberately faulty integrators.
+"""Tests of the detectors of the suite on deliberately faulty integrators.
 
-Each plug-in of :mod:`heavytop.api.faulty_integrators` runs the plan `selftest`, and its report is compared
-with that of the healthy integrator, as any candidate is with its baseline.
+Each plug-in of :mod:`heavytop.api.faulty_integrators` runs the plan `selftest`, and its report is compared with that of
+the healthy integrator, like any candidate with its baseline.
 """
 
 from __future__ import annotations
@@ -37,9 +37,8 @@ _SHOWN = 3
 class Trial:
     """The verdict of the comparison on one fault.
 
-    caught_by: measures and metrics that raised an alarm, with the cases where they did, strongest first.
-    shift: the metric that moved most without an alarm, improvements first, and by how many decades; None where one was
-    caught.
+    caught_by: measures and metrics that raised an alarm, with their cases, strongest first.
+    shift: without an alarm, the metric that changed most, improvements first, and its change in decades.
     """
 
     fault: str
@@ -51,7 +50,7 @@ class Trial:
 
     @property
     def as_expected(self) -> bool:
-        """Whether the alarm is raised just where it should be."""
+        """Whether an alarm is raised if and only if the fault is detectable."""
         return self.detectable == bool(self.caught_by)
 
     def to_json(self) -> dict[str, Any]:
@@ -92,7 +91,7 @@ def trial(name: str, comparison: Differences) -> Trial:
 
 
 def _decades(finding: Finding) -> float:
-    """How far the value moved; infinite where one of the two is not a number, or only one of them is 0."""
+    """The change of the value in decades; infinite if one of the two is not a number, or only one is 0."""
     try:
         old, new = (log10(exact(value or "")) for value in (finding.baseline, finding.candidate))
     except InputError:
@@ -103,7 +102,7 @@ def _decades(finding: Finding) -> float:
 
 
 def tasks(plan: str = "selftest") -> list[Task]:
-    """The measurements of the plan for every integrator: healthy, healthy with other roundings, each fault."""
+    """The tasks of the plan for each integrator: healthy, healthy with other roundings, each fault."""
     healthy = expand(load(plan, KINDS)[0])
     control = [replace(task, seed=1) for task in healthy]
     plug_ins = [fault.integrator for fault in FAULTS.values()]
@@ -111,22 +110,22 @@ def tasks(plan: str = "selftest") -> list[Task]:
 
 
 def trials(tasks: Sequence[Task], workers: int, progress: Callable[[Task], None]) -> list[Trial]:
-    """The trials that :func:`tasks` make: one for the control and one for each fault."""
+    """The trials of :func:`tasks`: one for the control and one for each fault."""
     rows_by_index: dict[int, Row] = {}
     for index, row in rows(tasks, KINDS, workers, None):
         rows_by_index[index] = row
         progress(tasks[index])
     names = (CONTROL, *FAULTS)
     size = len(tasks) // (1 + len(names))
-    healthy, *others = (
-        Report(SCHEMA, {}, {}, [rows_by_index[i] for i in range(at, at + size)]) for at in range(0, len(tasks), size)
+    healthy, *candidates = (
+        Report(SCHEMA, {}, {}, [rows_by_index[i] for i in range(k, k + size)]) for k in range(0, len(tasks), size)
     )
-    compared = (compare(healthy, other, Policy(), KINDS) for other in others)
+    compared = (compare(healthy, faulty, Policy(), KINDS) for faulty in candidates)
     return [trial(name, comparison) for name, comparison in zip(names, compared, strict=True)]
 
 
 def in_words(trials: Sequence[Trial]) -> RenderableType:
-    """A table of the faults: verdict, and what caught each or how far below every alarm it lies."""
+    """A table of the faults: verdict, and detectors or the largest change without an alarm."""
     table = Table(box=None, pad_edge=False)
     for name in ("fault", "what is wrong", "verdict", "caught by, strongest first"):
         table.add_column(name, overflow="fold", no_wrap=name in ("fault", "verdict"))
@@ -136,8 +135,8 @@ def in_words(trials: Sequence[Trial]) -> RenderableType:
             Text(trial.fault, style=style), Text(trial.about), Text(trial.verdict, style=style), Text(_words(trial))
         )
     wrong = [trial.fault for trial in trials if not trial.as_expected]
-    said = f"Not as expected: {', '.join(wrong)}." if wrong else "Every fault that can be seen was seen, and no other."
-    return Group(table, Text(), Text(said, style="bold red" if wrong else "green"))
+    note = f"Not as expected: {', '.join(wrong)}." if wrong else "Every fault that can be seen was seen, and no other."
+    return Group(table, Text(), Text(note, style="bold red" if wrong else "green"))
 
 
 def _words(trial: Trial) -> str:

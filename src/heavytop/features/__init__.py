@@ -1,7 +1,7 @@
-"""The features, a package each: its tables, measurement, document, charts, Python and command.
+"""The features, one package each: tables, measurement, document, charts, Python interface and command.
 
-Each package says in a :class:`heavytop.feature.Feature` what it adds; none imports another, and no shared room imports
-one.  A new feature is a package and a line here.
+Each package registers its parts in a :class:`heavytop.feature.Feature`; none imports another, and no shared module
+imports one.  A new feature is a package and a line here.
 """
 
 from __future__ import annotations
@@ -26,5 +26,5 @@ NAMES = (
     "limits",
     "engines",
 )
-"""In the order of the summary of a run."""
+"""The packages, in the order of the summary of a run."""
 FEATURES: tuple[Feature, ...] = tuple(import_module(f"{__name__}.{name}").FEATURE for name in NAMES)

@@ -1,4 +1,4 @@
-"""How good the derivatives of a motion are that another program computed, from Python."""
+"""Scores of derivatives of a motion that another program computed, from Python."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from heavytop.top.heavy_top import HeavyTop, State
 
 _SHAPE = "Give an array of shape (n, 6, 6) with [i, j] = ∂y_i(t)/∂y_j(0), y = (Ω1, Ω2, Ω3, γ1, γ2, γ3)."
 _MORE = 6
-"""Digits of the reference beyond those that were given."""
+"""Digits of the reference beyond those of the input."""
 _EXPLAINS = 2.0
-"""Digits that another convention must have right beyond those of the Jacobian as given."""
+"""Additional digits right that another convention must explain."""
 
 Matrix = Sequence[Sequence[Fraction]]
 
@@ -35,11 +35,11 @@ class DerivativeScore(Tabular):
 
     outcome: ``success``, or ``non_finite`` where an entry is NaN or infinite: the times before are scored.
     digits_right: −log10 of the largest |error|/max(1, |true value|) of an entry, over all times, at most the digits
-    of the format; None where no time was scored.  digits: the same at each of ``times`` that was scored.
+    of the format; None where no time was scored.  digits: likewise at each of ``times`` that was scored.
     worst: the name of the entry with that error at each, such as ``∂Ω1/∂γ2(0)``; errors: its |error|/max(1, |value|).
-    of_digits: decimal digits of what was given.  against: what it was compared with, and its largest radius.
-    diagnosis: a convention that fits better, a sentence each.
-    passed: whether as many digits are right as were required; None, not a pass, where that is not known.
+    of_digits: decimal digits of the input.  against: the reference, and its largest radius.
+    diagnosis: conventions that fit better, one sentence each.
+    passed: whether the required digits are right; None, which is no pass, if unknown.
     """
 
     outcome: str
@@ -77,24 +77,24 @@ def score_derivatives(
     system: System | str | None = None,
     require: Number | None = None,
 ) -> DerivativeScore:
-    """How many digits of the derivatives that any program computed are right: automatic, adjoint, or differences.
+    """Score derivatives of any program by their digits right: automatic, adjoint, or finite differences.
 
     Arguments:
         times: shape (n,), exact numbers in any order.
         jacobians: shape (n, 6, 6), [i, j] = ∂y_i(t)/∂y_j(0) with y = (Ω1, Ω2, Ω3, γ1, γ2, γ3), γ0 as three independent
             variables; an array of float64 or longdouble, or lists of numbers of any format or of text.  NaN and
             infinities are an outcome, not an error.
-        top, start: what the program was given, exactly: they are not rounded to a format.
+        top, start: the data of the program, exact: they are not rounded to a format.
         derivatives: "start", or "data" for [i, j] = ∂y_i(t)/∂θ_j with θ = (I1, I2, I3, n1, n2, n3), n = P r.
         system: as in :func:`heavytop.reference`.
-        require: digits that must be right, as ``passed`` of the result says; None asks that every entry is finite.
+        require: digits that must be right for ``passed`` of the result; None requires that every entry is finite.
 
     Returns:
         A :class:`DerivativeScore`.
 
     Raises:
         InputError: for an invalid motion, time or number, and for arrays of another shape.
-        OutOfReach: where the derivatives cannot be proven to so many digits.
+        OutOfReach: if the derivatives cannot be proven to so many digits.
     """
     needed = None if require is None else required(require)
     body, state = arguments.motion(top, start, of_any_size=True)
@@ -113,7 +113,7 @@ def score_derivatives(
 
 
 def _matrices(jacobians: Any, count: int) -> list[list[list[Any]]]:
-    """The entries as they were given; raises InputError that says the shape."""
+    """The entries as given; raises InputError for another shape."""
     shape = getattr(jacobians, "shape", None)
     if shape is not None and (len(shape) != 3 or tuple(shape[1:]) != (6, 6)):
         raise InputError(f"The Jacobians have the shape {tuple(shape)}.", _SHAPE)
@@ -171,7 +171,7 @@ def _scored(
 
 
 def _worst(matrix: Matrix, true: Matrix, radii: Matrix) -> tuple[Fraction, tuple[int, int]]:
-    """The largest |error|/max(1, |true value|) that an entry may have, and which it is."""
+    """The largest upper bound of |error|/max(1, |true value|) of an entry, and its indices."""
     errors = (
         ((abs(matrix[i][j] - true[i][j]) + radii[i][j]) / max(Fraction(1), abs(true[i][j])), (i, j))
         for i in range(len(true))
@@ -186,15 +186,17 @@ def _digits(error: Fraction, most: int) -> float:
 
 
 def _diagnoses(matrix: Matrix, true: Matrix, radii: Matrix, start: State) -> list[str]:
-    """Conventions under which the last Jacobian fits much better than as it was given."""
+    """Conventions under which the last Jacobian fits much better than as given."""
     size, gamma = range(6), (Fraction(0), Fraction(0), Fraction(0), *start.gamma)
-    flat = [[int(i == j) - gamma[i] * gamma[j] for j in size] for i in size]
-    projected = [[sum((true[i][k] * flat[k][j] for k in size), Fraction(0)) for j in size] for i in size]
+    projection = [[int(i == j) - gamma[i] * gamma[j] for j in size] for i in size]
+    projected = [[sum((true[i][k] * projection[k][j] for k in size), Fraction(0)) for j in size] for i in size]
     conventions = {
         "It is transposed: row i, column j is ∂y_i(t)/∂y_j(0).": [list(column) for column in zip(*true, strict=True)],
         "gamma0 was held on the unit sphere: here it counts as three independent variables.": projected,
     }
-    own = _digits(_worst(matrix, true, radii)[0], 10**6)
+    given = _digits(_worst(matrix, true, radii)[0], 10**6)
     return [
-        text for text, other in conventions.items() if _digits(_worst(matrix, other, radii)[0], 10**6) > own + _EXPLAINS
+        text
+        for text, known in conventions.items()
+        if _digits(_worst(matrix, known, radii)[0], 10**6) > given + _EXPLAINS
     ]

@@ -1,4 +1,4 @@
-"""Drift of every first integral over a horizon, and the distance from the true motion where that is known."""
+"""Drift of the first integrals over a horizon, and errors against the true motion if that is known."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ class DriftRun(msgspec.Struct, forbid_unknown_fields=True):
 class DriftTable(PlanTable, tag=NAME):
     """integrator: any that `heavytop list` shows.
 
-    attitude: whether ξ rides along and its errors, and those of the centre of mass, are measured too: of an integrator
-    that declares that it carries the attitude; others are given Ω and γ alone, and the flag of the row says so.
+    attitude: whether ξ is integrated too, and its errors and those of the centre of mass are measured; an integrator
+    that does not declare the attitude integrates Ω and γ alone, and the row has a flag.
     noise: whether each motion is computed again with other roundings, which takes most of the time of a row.
-    step: of an integrator with fixed steps, in the place of its own.
+    step: of an integrator with fixed steps; empty for its default.
     """
 
     cases: list[str]
@@ -69,7 +69,7 @@ class DriftTable(PlanTable, tag=NAME):
 
 
 class DriftKind(Kind):
-    """Drift in units of each integral, errors of Ω in 1/time unit, of γ none."""
+    """Drift in units of each integral, errors of Ω in 1/time unit, those of γ without unit."""
 
     name = NAME
     table = DriftTable
@@ -77,28 +77,28 @@ class DriftKind(Kind):
     place = 30
 
     def noise_is_reruns(self, metric: Metric) -> bool:
-        """All bands."""
+        """True: all bands are from reruns."""
         return True
 
     def cost(self, task: Task) -> float:
-        """The reruns that tell the rounding noise and the truth take about a second."""
+        """The cost of the run, and about a second for reruns and reference."""
         return (0.8 if task.options.noise else 0.1) + task.run_seconds
 
     def measure(self, task: Task, saved: Saved) -> Row:
-        """Measure one run.  Raises Contradiction where two proofs of the motion exclude each other, InputError for
-        a place reached with other flags.
+        """Measure one run.  Raises Contradiction if two proofs of the motion exclude each other, InputError for a
+        resume point with other flags.
         """
         if task.options.attitude and task.integrator.carries_attitude:
             return _row(task, *run_with_attitude(task))
         case, precision = task.given, task.precision
         problem = Problem.of(case.top, case.start, precision, case.system)
-        # samples are taken at the rounded times, so the series must be asked for by these
+        # samples are at the rounded times, which select those of the series
         keep = [exact(number(time, precision)) for time in task.keep]
         scorer = Scorer(problem, truth(problem, [exact(number(time, precision)) for time in task.times]), keep)
-        before = saved.load()
-        if before is not None:
-            scorer.restore(before["measures"])
-            _require_same_samples(scorer, [exact(number(t, precision)) for t in task.times], before["run"]["samples"])
+        stored = saved.load()
+        if stored is not None:
+            scorer.restore(stored["measures"])
+            _require_same_samples(scorer, [exact(number(t, precision)) for t in task.times], stored["run"]["samples"])
 
         def mark(resume_point: ResumePoint) -> None:
             if saved.due():
@@ -106,12 +106,12 @@ class DriftKind(Kind):
 
         resume: dict[str, Any] = {}
         if task.integrator.ensemble:
-            resume = {"place": None if before is None else ResumePoint.of(before["run"], precision), "mark": mark}
+            resume = {"place": None if stored is None else ResumePoint.of(stored["run"], precision), "mark": mark}
         run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer, **resume)
         return _row(task, run, scorer)
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
-        """Significant digits at the longest horizon; digits right, a line a motion; everything, a line a row."""
+        """Significant digits at the longest horizon, digits right per motion, and all results per row."""
         if (headline := digits_headline(rows)) is not None:
             yield headline
         yield from digits_columns(rows)
@@ -142,10 +142,10 @@ def _row(task: Task, run: Trajectory, scorer: Scorer) -> Row:
 
 
 def _require_same_samples(scorer: Scorer, times: Sequence[Fraction], samples: int) -> None:
-    """Raises ValueError unless the scorer has taken in the first so many of the samples."""
+    """Raise ValueError unless the scorer has measured the first ``samples`` samples."""
     known = scorer.truth
     for running in scorer.running().values():
         error = scorer.error is not None and running in scorer.error.running.values()
-        seen = [time for time in times[:samples] if not error or isinstance(known, str) or known.covers(time)]
-        if running.count != len(seen) or list(running.kept) != [time for time in seen if time in scorer.drift.keep]:
+        scored = [t for t in times[:samples] if not error or isinstance(known, str) or known.covers(t)]
+        if running.count != len(scored) or list(running.kept) != [t for t in scored if t in scorer.drift.keep]:
             raise ValueError("the place of the run is not that of what was measured of it")

@@ -1,4 +1,4 @@
-"""Engines of rigid bodies: adapters of each over one protocol, and a plan that measures those that are installed."""
+"""Rigid-body engines: adapters to the protocol of programs, and a plan that measures the installed ones."""
 
 from heavytop.feature import Feature
 

@@ -1,4 +1,4 @@
-"""How drift and error grow with the horizon."""
+"""Growth laws of drift and error."""
 
 from heavytop.feature import Feature
 

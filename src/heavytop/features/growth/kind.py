@@ -1,4 +1,4 @@
-"""How drift and the distance from the true motion grow over an ensemble of random starts: laws and their intervals."""
+"""Growth laws of drift and error over an ensemble of random starts, with their intervals."""
 
 from __future__ import annotations
 
@@ -36,22 +36,22 @@ from heavytop.top.attitude import perpendicular
 NAME = "growth"
 FAILED = Quantity("starts_failed")
 _MOST_BITS = 900
-"""Errors of more bits underflow in the floats that laws of growth are fitted with."""
+"""Errors in wider formats underflow in the doubles of the fits."""
 _BAND_OF_ONE = 0.75
-"""Decades, times 1/√n for n starts: 1.96/(√2 ln 10) = 0.60 for errors that are normal, and more for longer tails.  From
-24 starts on it is below the 2 bits that every error may grow by."""
+"""Decades, times 1/√n for n starts: 1.96/(√2 ln 10) = 0.60 for normal errors, more for heavier tails.  From 24 starts
+on it is below the 2 bits by which every error may grow."""
 _LIMITS = {"starts": range(1, 100_001), "samples": range(4, 1001), "decades": range(1, 13)}
 
 
 class GrowthRun(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """One format with its horizon, and how its ensemble is made.
+    """A format with its horizon, and the settings of its ensemble.
 
-    samples: a decade, over ``decades`` decades before the horizon.  starts: random ones, the same for the same seed.
-    tolerance, high_accuracy: of the integrator.  bias: a relative error of I1 in the field that is integrated and not
-    in the reference: a planted fault.  reference: a format whose bits the runs have at least that stand for the truth
-    where no closed form is known; None for 30 bits more than those of ``precision``, which they have in any case.
-    attitude: whether ξ rides along, and the laws of the errors of the attitude and of the centre of mass are found too:
-    of an integrator that declares that it carries the attitude, as a row of drift.
+    samples: per decade, over ``decades`` decades before the horizon.  starts: random ones, determined by the seed.
+    tolerance, high_accuracy: of the integrator.  bias: a relative error of I1 in the integrated field, but not in the
+    reference: a planted fault.  reference: a format with the fewest bits of reference runs, used if no closed form is
+    known; they always have 30 bits more than ``precision``.
+    attitude: whether ξ is integrated too, for laws of the errors of the attitude and of the centre of mass, if the
+    integrator declares that it carries the attitude.
     """
 
     precision: str
@@ -86,7 +86,7 @@ class GrowthTable(PlanTable, tag=NAME):
 
 
 def _task(case: Case, run: GrowthRun, integrator: str) -> Task:
-    """One row; raises InputError for an impossible value."""
+    """The task of a row; raises InputError for an impossible value."""
     precision = parse(run.precision)
     if precision.bits > _MOST_BITS:
         raise InputError(f"An ensemble in {precision.name}.", f"Laws of growth are fitted up to real:{_MOST_BITS}.")
@@ -117,7 +117,7 @@ def _task(case: Case, run: GrowthRun, integrator: str) -> Task:
 
 
 class _Done(msgspec.Struct):
-    """The finished motions of a row, by the index of the start: its text is the place of a row in progress."""
+    """The finished motions of a row by the index of the start: the checkpoint of a row in progress."""
 
     motions: dict[int, Ended]
 
@@ -131,32 +131,32 @@ class Growth(Kind):
     place = 50
 
     def carries_band(self, metric: Metric) -> bool:
-        """Every error; the number of failed starts is not one."""
+        """Whether the metric is an error; the number of failed starts is not."""
         return super().carries_band(metric) and metric.quantity != FAILED
 
     def least_band(self, starts: int) -> float:
-        """The band of an RMS over a few starts, of which none may have drawn the tail that those of a rerun do."""
+        """The band of an RMS over few starts, which may miss the tail that those of a rerun contain."""
         return _BAND_OF_ONE / math.sqrt(starts)
 
     def cost(self, task: Task) -> float:
-        """The cost of all starts, a few of them side by side."""
+        """The cost of all starts, several of them in parallel."""
         return 5.0 + int(task.options.starts) * task.run_seconds / 2
 
     def measure(self, task: Task, saved: Saved) -> Row:
-        """A start that ``saved`` holds is not computed again.
+        """Measure a row; starts in ``saved`` are not computed again.
 
-        Raises InputError for data outside the range of the format, OutOfReach where a first integral is not resolved.
+        Raises InputError for data outside the range of the format, OutOfReach if a first integral is not resolved.
         """
         case, precision, run = task.given, task.precision, task.options
         members = ensemble_of(case, run.starts, run.seed)
         true = [Problem.of(*member, precision, case.system) for member in members]
         turned = run.attitude and task.integrator.carries_attitude
-        # with the ξ that a start without attitude has
+        # with the default ξ of a start without attitude
         posed = [Problem.of(*m, precision, case.system, perpendicular(m[1].gamma)) for m in members] if turned else true
         biased = [_biased(problem, run.bias) for problem in posed]
         times = [exact(number(time, precision)) for time in task.times]
-        before = saved.load()
-        done = _Done({}) if before is None else msgspec.convert(before, _Done, strict=False)
+        stored = saved.load()
+        done = _Done({}) if stored is None else msgspec.convert(stored, _Done, strict=False)
 
         def save() -> None:
             if saved.due():
@@ -176,7 +176,7 @@ class Growth(Kind):
         return _row(task, [start for _, start in members], motions, scorers, compared, seconds, rounding)
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
-        """The laws, whether the planted faults are distinguished from them; the laws in short; a line for each law."""
+        """The headline, the laws in brief, and a table with a line for each law."""
         if (headline := laws_headline(rows)) is not None:
             yield headline
         yield from laws_in_short(rows)
@@ -208,12 +208,12 @@ def _cells(row: Row, law: Law) -> list[Cell]:
 
 
 def _biased(problem: Problem, bias: str | None) -> Problem:
-    """The problem with its first moment of inertia off by the relative ``bias``: the planted fault."""
+    """The problem with the planted fault: the first moment of inertia has the relative error ``bias``."""
     if bias is None:
         return problem
     first, *rest = problem.parameters.inertia
-    off = exact(number(first * (1 + exact(bias)), problem.precision))
-    return replace(problem, parameters=problem.parameters._replace(inertia=(off, *rest)))
+    biased = exact(number(first * (1 + exact(bias)), problem.precision))
+    return replace(problem, parameters=problem.parameters._replace(inertia=(biased, *rest)))
 
 
 def _row(
@@ -225,7 +225,7 @@ def _row(
     seconds: dict[str, float],
     rounding: Fraction,
 ) -> Row:
-    """Where the motions ended, and what they come to together."""
+    """The row of the finished motions."""
     precision, first = task.precision, motions[0]
     alone = task.options.attitude and not task.integrator.carries_attitude
     failed = [motion for motion in motions if motion.outcome != Outcome.SUCCESS.value]
@@ -260,7 +260,7 @@ def _row(
 
 
 def _label(law: Law) -> str:
-    """The quantity of a law, in words."""
+    """The name of the quantity of a law."""
     quantity = law.quantity or Quantity("")
     if quantity.name == DRIFT:
         return integral_text(quantity.component)
