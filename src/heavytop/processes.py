@@ -128,7 +128,7 @@ class ChildContext(LokyContext):  # type: ignore[misc]
 
     @property
     def ending(self) -> str:
-        """How the last process ended by itself; empty if unknown."""
+        """The way in which the last process ended by itself; empty if unknown."""
         child = self._children[-1]
         if child.pid is None:
             return ""
@@ -181,7 +181,7 @@ class GuardedProcess:
 
     @property
     def ending(self) -> str:
-        """How the process ended by itself; empty if unknown."""
+        """The way in which the process ended by itself; empty if unknown."""
         return self._context.ending
 
     def kill(self) -> None:

@@ -31,7 +31,7 @@ not_asked: it ran out of time in two other rows of that run."""
 
 HEYOKA, MULTIWORD = "heyoka", "multiword"
 FINEST = "eps"
-"""As a tolerance: the finest one of the integrator."""
+"""The tolerance that stands for the finest one of an integrator."""
 EXACT = "exact"
 """The precision of a row without a format."""
 Direction = Literal["", "forward", "backward"]

@@ -82,10 +82,10 @@ class Report(Tabular, records.Report, frozen=True):
             title += f" ({count} failed)"
         body = []
         for row in self.rows:
-            kept = digits_kept(row)
+            right = digits_kept(row)
             metrics = [metric for _, metric in drifts(row)]
             worst = max(metrics, key=lambda m: m.log10 or -1e9).value if metrics else ""
-            cells = (row_name(row.identity), row.outcome, "" if kept is None else f"{max(kept, 0):.1f}", short(worst))
+            cells = (row_name(row.identity), row.outcome, "" if right is None else f"{max(right, 0):.1f}", short(worst))
             body.append(list(map(printable, cells)))
         return TitledTable(printable(title), ("row", "outcome", "digits right", "largest drift"), body)
 

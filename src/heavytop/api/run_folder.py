@@ -216,10 +216,10 @@ def _greetings(tasks: Sequence[Task]) -> dict[str, tuple[str, str]]:
 
 def _greeting(command: Command) -> tuple[str, str]:
     try:
-        said = greeting(command)
+        answer = greeting(command)
     except PeerFailed as error:
         return f"not started: {error.cause}", ""
-    return said, said.partition(" ")[2]
+    return answer, answer.partition(" ")[2]
 
 
 def is_written(name: str) -> bool:

@@ -1,1 +1,1 @@
-"""How wrong it is."""
+"""Measurements: drift, errors against references, rounding noise and growth laws."""

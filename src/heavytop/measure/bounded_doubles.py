@@ -60,7 +60,7 @@ class BoundedDoubles:
         return BoundedDoubles(square.value, numpy.where((self.value == 0) & (self.error == 0), 0.0, square.error))
 
     def certainly_below(self, bound: float) -> NDArray[numpy.bool_]:
-        """Where the exact value is below ``bound``, which may be off by its rounding."""
+        """Mask of exact values below ``bound``, up to the rounding of that."""
         return numpy.asarray(self.value + self.error < bound / _ROOM)
 
     @numpy.errstate(all="ignore")

@@ -304,7 +304,7 @@ def median_interval(values: Array) -> Interval:
 
 
 def _lost(ensemble: Ensemble, growth: Growth, times: Array, rms: Array) -> str | None:
-    """When the RMS reaches a tenth of the size: the first such sample, else extrapolated by the law."""
+    """The time at which the RMS reaches a tenth of the size, in a sample, else by the law; None if unknown."""
     beyond = numpy.flatnonzero(ensemble.rms() >= LOST * ensemble.size)
     if len(beyond):
         return f"{ensemble.times[beyond[0]]:.3g}"

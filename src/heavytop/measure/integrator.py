@@ -118,12 +118,12 @@ def tried(
     alone = integrate(times[-1:])
     how = how._replace(least=max(how.least, 2), most=max(how.most, 2))
     figures, runs = timed(lambda j: integrate(times[-1:], _nudged(problem, j)), how)
-    most = _tolerated(problem, judged, len(runs), error)
+    allowed = _tolerated(problem, judged, len(runs), error)
     for run, what in [
         (alone, "asked for its last time alone"),
         *((run, "from a start units in the last place away") for run in runs),
     ]:
-        _require_near(name, run, judged, most, what, len(times))
+        _require_near(name, run, judged, allowed, what, len(times))
     if len(runs) > 1:
         _require_computed(name, integrate, problem, runs)
     compiling = max(0.0, judged.seconds["run"] - again.seconds["run"]) + max(0.0, alone.seconds["run"] - figures["run"])

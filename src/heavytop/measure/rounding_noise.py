@@ -198,9 +198,9 @@ def _mapped_masses(p: Parameters, change: Callable[[Fraction], Fraction]) -> Par
 def banded(run: Trajectory, metrics: Metrics, reruns: Sequence[Metrics]) -> Metrics:
     """The metrics with the bands of the reruns; the run itself counts in units of its eps."""
     coarser = math.log10(2) * (run.problem.precision.bits - DOUBLE.bits)
-    own = {
+    in_eps = {
         name: metric if metric.log10 is None else replace_struct(metric, log10=metric.log10 + coarser)
         for name, metric in metrics.items()
     }
-    widths = bands(reruns, _FLOOR, own)
+    widths = bands(reruns, _FLOOR, in_eps)
     return {name: replace_struct(metric, band=widths.get(name)) for name, metric in metrics.items()}

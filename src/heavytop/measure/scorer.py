@@ -33,7 +33,7 @@ _MANY_DRIFTS, _MANY_ERRORS = 128, 24
 """Below so many states balls take less time than arrays."""
 _SUMS_OF_DOUBLES = numpy.dtype(float), numpy.dtype(numpy.longdouble)
 _RANGE, _UNDERFLOW = (1e-40, 1e40), 1e-170
-"""Of numbers in this range, or 0, an integral loses at most that by underflow: 2^-1070 an operation, times 1e120."""
+"""Bound of the underflow in an integral of numbers in this range, or 0: 2^-1070 per operation, times 1e120."""
 
 
 class StatisticsOfStates(Statistics):

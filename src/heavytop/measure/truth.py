@@ -218,11 +218,11 @@ def _last_digit(references: Sequence[ComputedReference], fewer: Sequence[int]) -
 
     The error in the format is that of the coarser run times 2^fewer: both are amplified alike.
     """
-    lost = [
+    uncertain = [
         reference.beyond(Fraction(1, _DIGIT) / 2 ** max(0, bits))
         for reference, bits in zip(references, fewer, strict=True)
     ]
-    return next((time for time in references[0].balls if any(time in reference for reference in lost)), None)
+    return next((time for time in references[0].balls if any(time in reference for reference in uncertain)), None)
 
 
 def _states(served: Sequence[_WithArithmetic], times: Sequence[Fraction], effort: float) -> list[Sequence[Any]]:

@@ -107,8 +107,8 @@ def _task(case: Case, run: GrowthRun, integrator: str) -> Task:
         )
     steps = range(-run.samples * run.decades, 1)
     times = tuple(horizon * Fraction(f"{10 ** (step / run.samples):.4g}") for step in steps)
-    asked = {"tolerance": run.tolerance or "", "high_accuracy": run.high_accuracy, "bias": run.bias or ""}
-    subject = computed(integrator, seed=run.seed, **asked)
+    controls = {"tolerance": run.tolerance or "", "high_accuracy": run.high_accuracy, "bias": run.bias or ""}
+    subject = computed(integrator, seed=run.seed, **controls)
     reference = "" if run.reference is None else parse(run.reference).name
     request = {"attitude": str(run.attitude), "reference": reference}
     title = f"{integrator} {subject.variant}".rstrip()

@@ -127,7 +127,7 @@ def double_peer(
         systems, directions, precisions: what it declares that it can do, such as ["heavy_top"], ["forward"],
             ["double"]: the rows of a plan that ask for anything else are ``unsupported``, and no failures.  None
             declares nothing: a row that it cannot do is then ``failed``.
-        attitude: declares that it carries ξ: where that is asked for, states have nine numbers, and so has ``start``.
+        attitude: declares that it carries ξ: if that is requested, states have nine numbers, and so has ``start``.
             "quaternion" declares that it computes with one: states have seven numbers then, Ω and (w, x, y, z).
         one_step: False declares that a step depends on more than the state where it begins: of a multistep method,
             say.  Its single steps and restarts are not judged then, and its order is that of whole runs.

@@ -44,8 +44,8 @@ def odefun(problem: Problem, times: Sequence[Fraction], tolerance: Fraction | No
         return list(system.with_attitude(p, y))
 
     p = problem.parameters.mapped(lambda value: big(Fraction(value)))
-    wanted = None if tolerance is None else big(tolerance)
-    solve = context.odefun(rates, 0, [big(v) for v in (*problem.start.flat, *(problem.xi or ()))], tol=wanted)
+    mpf_tolerance = None if tolerance is None else big(tolerance)
+    solve = context.odefun(rates, 0, [big(v) for v in (*problem.start.flat, *(problem.xi or ()))], tol=mpf_tolerance)
     values = [[exact(v) for v in solve(big(time))] for time in grid]
     seconds = perf_counter() - began
     states = tuple(numpy.array([number(v, precision) for v in row]) for row in values)
