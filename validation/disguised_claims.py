@@ -7,8 +7,8 @@ power for an odd one, a sum of arcs that is off by π.
 
     python validation/disguised_claims.py [--family NAME] [--every 1]
 
-Of the whole, 261 of the 263 claims that are true, or refuted by construction, get that verdict, and none of the 138
-false neighbours holds.
+Of the 263 claims that are true, or refuted by construction, 259 get that verdict; none of the 138 false neighbours
+holds.
 """
 
 from __future__ import annotations
