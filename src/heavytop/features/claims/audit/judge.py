@@ -102,7 +102,7 @@ class Audit(Tabular):
     """The audit of one claim about one system.
 
     why: the explanation of the verdict, each step checked.  solves: the systems whose equations of motion the claim
-    satisfies on its smooth branch, or under which the integral or relation is invariant.  kind: a key of :data:`ABOUT`.
+    satisfies on its smooth branch, or under which the integral or relation is invariant.  kind: a key of ``ABOUT``.
     constants: names in the residuals with their meanings, such as k/2.  entry: of the library, where it is one.
     deciding: of an undecided claim, assumptions each of which decides it, with the verdict then.
     unused: parameters of a file that no formula uses.  where: formulas that are 0 where an integral is claimed.
