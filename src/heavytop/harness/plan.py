@@ -172,7 +172,7 @@ def document_of(text: str) -> dict[str, Any]:
     return {key: _as_written(key, value) for key, value in tomllib.loads(text, parse_float=str).items()}
 
 
-def _as_written(key: str, value: Any) -> Any:
+def _as_written(key: str, value: object) -> Any:
     if isinstance(value, dict):
         return {name: _as_written(name, item) for name, item in value.items()}
     if isinstance(value, list):

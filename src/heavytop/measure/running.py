@@ -80,7 +80,7 @@ class RunningStatistics:
         """The values at the chosen times."""
         return Series([time_text(t) for t in self.kept], [text(v) for v in self.kept.values()], quantity)
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> dict[str, object]:
         """The state of a checkpoint: text and integers, exact."""
         return {
             **{name: ball_text(value) for name, value in self.sums._asdict().items()},
@@ -128,7 +128,7 @@ class Statistics:
             if quantity.component != RELATIVE
         }
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> dict[str, object]:
         """The state of a checkpoint by component: text and integers, exact."""
         return {quantity.component: running.content() for quantity, running in self.quantities().items()}
 

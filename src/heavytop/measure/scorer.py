@@ -258,7 +258,7 @@ class SolutionError(StatisticsOfStates):
         """``NAME_omega``, ``_gamma``, ``_along``, ``_across`` and ``_relative``."""
         return {Quantity(self.name, part): running for part, running in self.running.items()}
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> dict[str, object]:
         """The state of a checkpoint, the escape time included."""
         return {"escape": None if self.escape is None else str(self.escape), **super().content()}
 
@@ -363,10 +363,11 @@ class Scorer(DriftAndError):
         for time, state in zip(times, states, strict=True):
             self(time, state)
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> dict[str, object]:
         """The state of a checkpoint: text and integers, exact."""
         self.one_by_one()
-        return {"drift": self.drift.content()} | ({"error": self.error.content()} if self.error else {})
+        content: dict[str, object] = {"drift": self.drift.content()}
+        return content | {"error": self.error.content()} if self.error else content
 
     def restore(self, content: dict[str, Any]) -> None:
         """Restore a state saved by :meth:`content`."""

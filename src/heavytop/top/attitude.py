@@ -651,7 +651,7 @@ def signs(start: Sequence[float], quaternions: NDArray[numpy.float64]) -> NDArra
     return numpy.cumprod(numpy.where((chain[1:] * chain[:-1]).sum(axis=1) < 0, -1.0, 1.0), dtype=float)
 
 
-def document_of(outputs: Sequence[Output], values: Callable[[Output], Any]) -> dict[str, Any]:
+def document_of(outputs: Sequence[Output], values: Callable[[Output], Any]) -> dict[str, object]:
     """The keys of a JSON document for these outputs."""
     document: dict[str, Any] = {}
     for output in outputs:

@@ -401,13 +401,13 @@ class Magnitude:
     def __init__(self, size: Any) -> None:
         self.size: Any = size.size if isinstance(size, Magnitude) else abs(size)
 
-    def __add__(self, other: Any) -> Magnitude:
+    def __add__(self, other: object) -> Magnitude:
         return Magnitude(self.size + Magnitude(other).size)
 
-    def __mul__(self, other: Any) -> Magnitude:
+    def __mul__(self, other: object) -> Magnitude:
         return Magnitude(self.size * Magnitude(other).size)
 
-    def __truediv__(self, other: Any) -> Magnitude:
+    def __truediv__(self, other: object) -> Magnitude:
         return Magnitude(self.size / Magnitude(other).size)
 
     __sub__ = __radd__ = __add__

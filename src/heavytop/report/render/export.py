@@ -303,14 +303,14 @@ def escaped(text: str) -> str:
 # The document of a report as JSON, for programs, and as Markdown, for pull requests.
 
 
-def to_json(report: Report, kinds: Kinds) -> dict[str, Any]:
+def to_json(report: Report, kinds: Kinds) -> dict[str, object]:
     """The blocks of each kind, without charts: a cell is text, or an object with its type."""
     blocks = document(report, kinds, In.FULL)
     kinds_blocks = [{"kind": name, "blocks": [_block(block) for block in blocks]} for name, blocks in blocks.items()]
     return {"plan": report.plan, "measurements": len(report.rows), "kinds": kinds_blocks}
 
 
-def _block(block: Block) -> dict[str, Any]:
+def _block(block: Block) -> dict[str, object]:
     name = {"block": type(block).__name__.lower()}
     match block:
         case Headline() | Note():

@@ -74,7 +74,7 @@ def history(reports: Sequence[AnyReport], policy: Policy, kinds: Kinds) -> list[
     return [replace(t, row=t.row._replace(versions=tuple(versions.get(t.row, ())))) for t in tracks.values()]
 
 
-def history_json(names: Sequence[str], tracks: Sequence[Track]) -> dict[str, Any]:
+def history_json(names: Sequence[str], tracks: Sequence[Track]) -> dict[str, object]:
     """The document of `history --json`."""
     return {
         "reports": list(names),

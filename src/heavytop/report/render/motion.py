@@ -205,7 +205,7 @@ def _tex_mark(mark: str) -> str:
     return f"{_GREEK[mark[0]]}_{mark[1:]}"
 
 
-def _flat(value: Any) -> list[Any]:
+def _flat(value: object) -> list[Any]:
     """The numbers of a nested list."""
     return [part for item in value for part in _flat(item)] if isinstance(value, list) else [value]
 
