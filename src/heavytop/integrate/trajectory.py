@@ -569,7 +569,7 @@ class Trajectory(Tabular, InSpace):
         return TitledTable(title, ("t", *names), rows, notes)
 
 
-def _shown(value: Any, digits: int) -> str:
+def _shown(value: object, digits: int) -> str:
     try:
         return decimal_text(exact(value), digits)
     except InputError:

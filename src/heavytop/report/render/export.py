@@ -202,7 +202,7 @@ def metrics_csv(report: Report, kinds: Kinds) -> str:
     return buffer.getvalue()
 
 
-def _json(document: Any) -> str:
+def _json(document: object) -> str:
     return json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 

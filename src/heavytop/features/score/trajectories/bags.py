@@ -69,7 +69,7 @@ def _opened(path: Path) -> Iterator[Any]:
         raise InputError(f"The bag cannot be read: {quoted(str(error))}.", "Check it with: rosbags-convert.") from None
 
 
-def _flat(value: Any, name: str) -> Iterator[tuple[str, str]]:
+def _flat(value: object, name: str) -> Iterator[tuple[str, str]]:
     """Names and texts of the numbers in a message; a list of one message counts as that message."""
     if is_dataclass(value):
         for part in fields(value):

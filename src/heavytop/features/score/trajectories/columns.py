@@ -374,7 +374,7 @@ def convention(document: Mapping[str, Any], header: Header | None = None) -> Con
     return Convention(**stated)
 
 
-def _is_direction(value: Any) -> bool:
+def _is_direction(value: object) -> bool:
     """Whether the value of ``quaternion`` or ``matrix`` is a word, and not an attitude."""
     return isinstance(value, str) and any(letter in value for letter in "bdstuy_")
 
@@ -541,7 +541,7 @@ def cell_of(value: Any, where: str) -> Fraction | None:
     return cell(value, where)
 
 
-def _is_table(value: Any, name: str) -> bool:
+def _is_table(value: object, name: str) -> bool:
     """Whether a value is a list of rows, one for each time, and not the value at the start."""
     if not isinstance(value, list) or not value or not isinstance(value[0], list):
         return False
@@ -625,7 +625,7 @@ def _omega(document: Mapping[str, Any], first: Mapping[str, tuple[Fraction, ...]
     )
 
 
-def _attitude(value: Any, name: str, key: str, convention: Convention) -> tuple[list[Fraction], bool]:
+def _attitude(value: object, name: str, key: str, convention: Convention) -> tuple[list[Fraction], bool]:
     """The numbers of one attitude, and whether they are angles in degrees, declared or written as 30deg."""
     if isinstance(value, str):
         value = value.replace(",", " ").split()

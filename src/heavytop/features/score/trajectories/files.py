@@ -578,7 +578,7 @@ def _text(document: dict[str, Any], key: str, default: str | None = None) -> str
     return value
 
 
-def _integer(value: Any, what: str) -> int:
+def _integer(value: object, what: str) -> int:
     number = written_numbers.finite(value, what)
     if number < 0 or number.denominator != 1 or number >= 1 << 63:
         raise InputError(f"{what} = {shown(number)} is not a count.", "Give an integer from 0 to 2^63 - 1.")
