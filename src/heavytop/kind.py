@@ -21,7 +21,7 @@ class Kind(run.MeasuredKind, reported.ReportedKind):
     """
 
     def measure(self, task: Task, saved: Saved) -> Row:
-        """Nothing: no plan asks for it."""
+        """The row of a task; a kind without this method is in no plan."""
         raise NotImplementedError
 
 

@@ -26,7 +26,7 @@ UNMEASURED = OUT_OF_REACH, CONTRADICTION, FAILED, UNSUPPORTED, OUT_OF_TIME, NOT_
 """Outcomes of a row that was aborted: it has no metrics, and a reason instead of a reference.
 
 failed: a third-party integrator raised an error, or returned no trajectory.  unsupported: the request is beyond its
-declared capabilities, which is no failure.  out_of_time: it was stopped at the time limit of its row.
+declared capabilities; not a failure.  out_of_time: it was stopped at the time limit of its row.
 not_asked: it ran out of time in two other rows of that run."""
 
 HEYOKA, MULTIWORD = "heyoka", "multiword"
@@ -282,7 +282,7 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
     how: proven values, computed ones, equations, or none but its own first integrals.
     radius: decimal text, of the proven balls, or of the agreement of two computed runs.  certificates: that of the
-    first start before that of all starts.  reason: why there is none, or none that is proven.
+    first start before that of all starts.  reason: of a reference that is missing or not proven.
     until: decimal text; the time from which all significant digits of the format are lost.
     """
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import reduce
@@ -97,14 +98,14 @@ class RunningStatistics:
         self.kept = {Fraction(time): ball_from(value) for time, value in content["kept"].items()}
 
 
-class Statistics:
+class Statistics(ABC):
     """Running statistics of several quantities of a motion.  bits: of the working precision."""
 
     bits: int
 
+    @abstractmethod
     def quantities(self) -> dict[Quantity, RunningStatistics]:
         """The statistics of each quantity."""
-        raise NotImplementedError
 
     def maximum_only(self, quantity: Quantity) -> bool:
         """Whether only its maximum is reported: true of errors relative to the state."""

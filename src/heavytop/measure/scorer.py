@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -61,9 +62,9 @@ class StatisticsOfStates(Statistics):
         if len(self._pending) == _BATCH:
             self.flush()
 
+    @abstractmethod
     def flush(self) -> None:
         """Evaluate the pending states."""
-        raise NotImplementedError
 
     @property
     def running(self) -> dict[str, RunningStatistics]:

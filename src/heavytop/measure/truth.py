@@ -35,7 +35,7 @@ from heavytop.top.heavy_top import check_times
 
 # References without proof: two multi-word runs of different precision, valid to the digits that agree.
 #
-# Labelled computed, not proven: the radius is the difference of the two runs, which is no rigorous bound.  The state is
+# Labelled computed, not proven: the radius is the difference of the two runs, not a rigorous bound.  The state is
 # that of the finer run, so the radius is the error of the coarser one, and the error of the state is smaller by the
 # difference of their bits, on a chaotic motion too: both lose digits alike.
 

@@ -39,7 +39,7 @@ class DerivativeScore(Tabular):
     worst: the name of the entry with that error at each, such as ``∂Ω1/∂γ2(0)``; errors: its |error|/max(1, |value|).
     of_digits: decimal digits of the input.  against: the reference, and its largest radius.
     diagnosis: conventions that fit better, one sentence each.
-    passed: whether the required digits are right; None, which is no pass, if unknown.
+    passed: whether the required digits are right; None if unknown, which is not a pass.
     """
 
     outcome: str

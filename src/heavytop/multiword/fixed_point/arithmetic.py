@@ -353,7 +353,7 @@ def grid_of(words: int, whole: bool = False) -> Grid:
 
 
 def grid_for(bits: int) -> Grid | None:
-    """The smallest grid of at least ``bits`` bits and three words, of two widths a word; None where there is none."""
+    """The smallest grid with at least ``bits`` bits and three words, of two widths; None beyond the largest."""
     wide = next((grid for grid in map(grid_of, range(3, MOST_WORDS + 1)) if grid.total >= bits), None)
     if wide is None:
         return None

@@ -58,7 +58,7 @@ _VECTORS = {"": _WHOLE, "γ": slice(3, None), "Ω": slice(0, 3)}
 _ALONE = 1000.0
 """A few states are outliers if their error is so many times that of any other, ..."""
 _RIGHT = 1e-2
-"""... which is no more than that, ..."""
+"""... if these errors are at most that, ..."""
 _FEW_OF, _MOST_ALONE = 4, 8
 """... and if they are at most one in four, and so many."""
 _GRID = 200

@@ -6,6 +6,7 @@ about as well the simplest is named.  In the first samples a fall by a factor of
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -89,7 +90,7 @@ class Hypothesis(NamedTuple):
         return self.drop if not likely else likely if self.drop == DROP else DROP if self.is_round else self.drop
 
 
-class Search:
+class Search(ABC):
     """The search for the mistake of a file.
 
     file_errors: of each sample compared, as the file stands.  times: of these, in units of the file.
@@ -101,13 +102,13 @@ class Search:
     states: int
     names_others = False
 
+    @abstractmethod
     def hypotheses(self) -> Iterable[Hypothesis]:
         """The simplest first, those with a fitted number last."""
-        raise NotImplementedError
 
+    @abstractmethod
     def further(self, diagnosis: Diagnosis | None, error: float) -> Iterator[Hypothesis]:
         """Hypotheses that are tried only where nothing, or nothing better than this, explains the error."""
-        raise NotImplementedError
 
     @cached_property
     def tried(self) -> list[Hypothesis]:
