@@ -1,5 +1,6 @@
 """Balls as text, and the promise of bits: each radius is an upper bound, each ball as narrow as it was asked to be."""
 
+from decimal import ROUND_CEILING, Context, Decimal
 from fractions import Fraction
 from random import Random
 
@@ -21,15 +22,29 @@ from heavytop.exact.flint.balls import (
 )
 
 
-def test_a_printed_value_and_radius_hold_the_ball() -> None:
-    rng = Random(1)
-    for _ in range(200):
-        middle = Fraction(rng.randint(-(10**12), 10**12), rng.randint(1, 10**9)) * Fraction(10) ** rng.randint(-40, 40)
-        with working_precision(rng.randint(20, 200)):
-            value = ball(middle)
-        text, wide = value_text(value, rng.randint(1, 30))
-        off = abs(Fraction(text) - midpoint(value))
-        assert off + radius(value) <= Fraction(wide) <= (off + radius(value)) * Fraction(102, 100)
+def test_the_printed_radius_is_the_least_of_three_digits_that_encloses_the_ball_and_the_rounding() -> None:
+    random = Random(7)
+    with working_precision(400):
+        balls = [
+            arb(
+                arb((random.randint(-(2**200), 2**200), random.randint(-400, 200))),
+                arb((random.randint(0, 2**29), random.randint(-500, 20))),
+            )
+            for _ in range(300)
+        ]
+        balls += [arb(0), arb(1), arb(0, 1), arb((1, 3000)), arb((-1, -3000))]
+        for ball in balls:
+            for digits in (1, 16, 51):
+                value, wide = map(Fraction, value_text(ball, digits))
+                needed = radius(ball) + abs(value - midpoint(ball))
+                assert needed <= wide
+                least = Context(3, ROUND_CEILING).divide(Decimal(needed.numerator), Decimal(needed.denominator))
+                assert wide == Fraction(least)
+                size = abs(midpoint(ball))
+                if size <= radius(ball):
+                    assert value == 0
+                else:
+                    assert abs(value - midpoint(ball)) <= size * Fraction(5, 10**digits)
 
 
 @pytest.mark.parametrize("value", [Fraction(1, 3), Fraction(10**40 + 1, 10**40), Fraction(2, 7) / 10**500])

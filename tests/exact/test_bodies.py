@@ -248,13 +248,6 @@ def test_what_is_no_body_or_start_is_refused(make: Any, message: str) -> None:
         make()
 
 
-@pytest.mark.slow
-def test_a_time_beyond_the_enclosure_is_out_of_reach_by_name() -> None:
-    start = ht.State((1, 2, -3), attitude=ht.Attitude.quaternion(1, 0, 0, 0))
-    with pytest.raises(OutOfReach):
-        ht.reference(LOPSIDED, start, ["1e12"], 30)
-
-
 def test_rotations_of_the_independent_integration_are_rotations() -> None:
     rows = rotation([Fraction(1), Fraction(2), Fraction(3), Fraction(4)])
     assert multiplied(rows, transposed(rows)) == IDENTITY

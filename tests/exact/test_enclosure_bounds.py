@@ -18,6 +18,7 @@ from heavytop.exact.enclosure.step import CAP, Errors, Node, Whole, quadratic, s
 from heavytop.exact.flint.balls import midpoint, radius, working_precision
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
+from support.proofs import assert_overlap
 
 TOP = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
 START = State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
@@ -334,8 +335,7 @@ def test_motions_from_the_edge_of_the_set_stay_inside(size):
         for sign in (1, -1):
             moved = [c + Fraction(size) * int(sign * s) for c, s in zip(centre, rows, strict=True)]
             for tau, balls in sets.items():
-                for ball, true in zip(balls, true_motion(moved, tau * found.length), strict=True):
-                    assert abs(midpoint(ball) - midpoint(true)) <= radius(ball) + radius(true)
+                assert_overlap(balls, true_motion(moved, tau * found.length))
             gap = [
                 [midpoint(true) - Fraction(int(c), 2**precision)]
                 for true, c in zip(true_motion(moved, found.length), following.centre, strict=True)

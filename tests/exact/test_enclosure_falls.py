@@ -16,6 +16,7 @@ from heavytop.exact.enclosure.step import Errors, rounded_off, start_node, step
 from heavytop.exact.flint.balls import midpoint, radius, relative_bits, working_precision
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
+from support.proofs import assert_overlap
 
 TOP = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
 TILTED = ("3/5", 0, "4/5")
@@ -36,11 +37,6 @@ def early(monkeypatch):
 
 def falls_of(solution):
     return [fall.precision for known in solution._runs.values() for fall in known.falls]
-
-
-def require_overlap(balls, others):
-    for ball, other in zip(balls, others, strict=True):
-        assert abs(midpoint(ball) - midpoint(other)) <= radius(ball) + radius(other)
 
 
 def test_a_number_is_rounded_to_nearest_whatever_its_sign():
@@ -100,7 +96,7 @@ def test_balls_hold_the_motion_however_early_the_precision_falls(name, early):
     for time, values in zip(times, true, strict=True):
         balls = falling.state(time, 90)
         assert min(map(relative_bits, balls)) >= 90
-        require_overlap(balls, values)
+        assert_overlap(balls, values)
     assert falls_of(falling)
 
 
@@ -110,7 +106,7 @@ def test_a_homoclinic_motion_is_held_by_its_closed_form(early):
     known = DeloneHomoclinic(Fraction(1), Fraction(1))
     falling = Validated(known.top, known.start)
     for time in (Fraction(30), Fraction(-25)):
-        require_overlap(falling.state(time, 100), known.state(time, 200))
+        assert_overlap(falling.state(time, 100), known.state(time, 200))
     assert falls_of(falling)
 
 
@@ -121,7 +117,7 @@ def test_attitude_and_uncertain_data_fall_too(early):
     early(2)
     falling = Validated(TOP, START, uncertainty=run.Uncertainty(off, Fraction(0)))
     balls = falling.with_attitude(Fraction(10), 90)
-    require_overlap(balls, exact)
+    assert_overlap(balls, exact)
     assert falls_of(falling)
 
 
@@ -181,7 +177,7 @@ def test_proven_steps_in_a_row_hold_the_motion(early):
                 with working_precision(300):
                     scaled = found.at((time - found.node.time) / found.length)
                     balls = [value * run.ball(size) for value, size in zip(scaled, motion.scaled.sizes, strict=True)]
-                require_overlap(balls, values)
+                assert_overlap(balls, values)
                 del asked[time]
     assert not asked
     assert len(precisions) > 1

@@ -2,6 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
+from functools import partial
 from random import Random
 
 import pytest
@@ -15,26 +16,11 @@ from heavytop.multiword.fixed_point import fixed_point_run
 from heavytop.multiword.fixed_point.certified_series import CertifiedSeries, WordSeries
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
+from support.proofs import assert_overlap
 
 TOP = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
 START = State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
 XI = (Fraction(0), Fraction(1), Fraction(0))
-
-
-def in_integers(monkeypatch, solution, time, bits):
-    """The same by exact integers, with more bits: its own pilot, steps and roundings."""
-    with monkeypatch.context() as m:
-        m.setattr(run, "_GRIDS", ())
-        return solution.state(time, bits + 64)
-
-
-def require_inside(balls, true):
-    for ball, value in zip(balls, true, strict=True):
-        assert abs(midpoint(ball) - midpoint(value)) <= radius(ball) + radius(value)
-
-
-def used_words(solution):
-    return any(in_words for _, _, in_words, _ in solution._runs)
 
 
 def solved(system, unit=Fraction(1), moments=(3, 2, 1), omega=START.omega, moment=("1/2", "1/3", "1/5")):
@@ -45,23 +31,9 @@ def solved(system, unit=Fraction(1), moments=(3, 2, 1), omega=START.omega, momen
     return Validated(top, start, system, rotor=Fraction(2, 3) * unit if system is GYROSTAT else None)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("system", "unit"),
-    [(HEAVY_TOP, -100), (GYROSTAT, 100), (HEAVY_GYROSTAT, 0)],
-    ids=lambda part: getattr(part, "name", part),
-)
-def test_balls_hold_what_exact_integers_find(system, unit, monkeypatch):
-    size = Fraction(10) ** unit
-    # Ω is absolute below 1: what is so slow has its own bits
-    bits, times = (360, (-5,)) if unit < 0 else (120, (Fraction(37, 6), -5))
-    for time in (t / size for t in times):
-        one, other = (solved(system, size) for _ in range(2))
-        balls = one.state(time, bits)
-        assert used_words(one)
-        assert min(map(relative_bits, balls)) >= bits
-        require_inside(balls, in_integers(monkeypatch, other, time, bits))
-        assert not used_words(other)
+def near_an_equilibrium(digits):
+    """Coefficients are smaller than the state by several words at once."""
+    return Validated(HeavyTop((3, 2, 1), 1, (1, 0, 0)), State((0, Fraction(1, 10**digits), 0), (1, 0, 0)))
 
 
 DEGENERATE = {
@@ -74,16 +46,23 @@ DEGENERATE = {
     "nearly equal": {"moments": (1, 1 + Fraction(1, 2**60), 1)},
     "renamed": {"moments": (1, 3, 2)},
 }
+SLOW, FAST = Fraction(1, 10**100), Fraction(10**100)
+HELD = {
+    "slow": (partial(solved, HEAVY_TOP, SLOW), -5 / SLOW, 360),  # Ω is absolute below 1: it has its own bits
+    "fast": (partial(solved, GYROSTAT, FAST), Fraction(37, 6) / FAST, 120),
+    "fast and back": (partial(solved, GYROSTAT, FAST), -5 / FAST, 120),
+    "heavy gyrostat": (partial(solved, HEAVY_GYROSTAT), Fraction(37, 6), 120),
+    "heavy gyrostat and back": (partial(solved, HEAVY_GYROSTAT), Fraction(-5), 120),
+    **{name: (partial(solved, HEAVY_TOP, **data), Fraction(5, 2), 110) for name, data in DEGENERATE.items()},
+    **{f"1e-{n} off rest": (partial(near_an_equilibrium, n), Fraction(40), 120) for n in (20, 40, 70)},
+}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", DEGENERATE)
-def test_degenerate_motions_are_held_too(name, monkeypatch):
-    one, other = (solved(HEAVY_TOP, **DEGENERATE[name]) for _ in range(2))
-    time = Fraction(5, 2)
-    balls = one.state(time, 110)
-    assert used_words(one)
-    require_inside(balls, in_integers(monkeypatch, other, time, 110))
+@pytest.mark.parametrize("name", HELD)
+def test_balls_hold_what_exact_integers_find(name, monkeypatch):
+    make, time, bits = HELD[name]
+    assert_held(monkeypatch, make, "state", time, bits)
 
 
 @pytest.mark.slow
@@ -92,14 +71,20 @@ def test_random_motions_with_their_attitude_are_held(monkeypatch):
     for _ in range(2):
         top = HeavyTop([random.randint(20, 30) for _ in range(3)], 1, [random.randint(-9, 9) for _ in range(3)])
         omega, gamma = ([Fraction(random.randint(-9, 9), 7) for _ in range(3)] for _ in range(2))
-        one, other = (Validated(top, State(omega, gamma), xi=XI) for _ in range(2))
         time = Fraction(random.randint(30, 50), 7)
-        balls = one.attitude(time, 100)
-        with monkeypatch.context() as m:
-            m.setattr(run, "_GRIDS", ())
-            require_inside(balls, other.attitude(time, 200))
-        assert used_words(one)
-        assert not used_words(other)
+        assert_held(monkeypatch, partial(Validated, top, State(omega, gamma), xi=XI), "attitude", time, 100)
+
+
+def assert_held(monkeypatch, make, what, time, bits):
+    """In words, against exact integers of more bits, which have a pilot, steps and roundings of their own."""
+    one, other = make(), make()
+    balls = getattr(one, what)(time, bits)
+    with monkeypatch.context() as patch:
+        patch.setattr(run, "_GRIDS", ())
+        assert_overlap(balls, getattr(other, what)(time, bits + 64))
+    assert min(map(relative_bits, balls)) >= bits
+    for solution, in_words in ((one, True), (other, False)):
+        assert any(words for _, _, words, _ in solution._runs) is in_words
 
 
 @pytest.mark.slow
@@ -161,13 +146,3 @@ def test_a_step_that_words_cannot_hold_is_shortened():
     assert found.node.halvings > -3
     assert isinstance(found.series, WordSeries)
     assert isinstance(certified, CertifiedSeries)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("digits", [20, 40, 70])
-def test_balls_near_an_equilibrium_hold_what_exact_integers_find(digits, monkeypatch):
-    """Coefficients are smaller than the state by several words at once."""
-    top = HeavyTop((3, 2, 1), 1, (1, 0, 0))
-    start = State((0, Fraction(1, 10**digits), 0), (1, 0, 0))
-    balls = Validated(top, start).state(Fraction(40), 120)
-    require_inside(balls, in_integers(monkeypatch, Validated(top, start), Fraction(40), 120))

@@ -1,9 +1,7 @@
 """Euler-Poinsot against its equations, and its separatrix."""
 
-import json
 import random
 from fractions import Fraction
-from pathlib import Path
 
 import pytest
 
@@ -11,7 +9,6 @@ from heavytop.exact.cases.euler import Euler
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_every_digit, assert_solves, positive, triple
 
-VECTORS = json.loads((Path(__file__).parents[1] / "data" / "vectors.json").read_text())
 TINY = Fraction(1, 10**30)
 
 

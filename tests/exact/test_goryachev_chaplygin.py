@@ -91,13 +91,6 @@ def test_levels_too_near_to_one_that_is_not_done_are_left_to_the_enclosure(power
         assert reference(top, start, [1, -3], 20).method.startswith("validated")
 
 
-def test_levels_that_are_not_done_are_named():
-    with pytest.raises(NotInClass, match="both separated variables rest"):
-        motion_from((F(1), F(1, 3)), (0, 0, 0), (F(3, 5), 0, F(4, 5)))
-    with pytest.raises(NotInClass, match="both separated variables"):
-        motion_from((F(1), F(0)), (0, F(1, 4), 0), (F(3, 5), 0, F(4, 5)))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("exponent", [1, 2, 3])
 def test_near_a_degenerate_level_every_digit_comes_out(exponent):
@@ -105,10 +98,3 @@ def test_near_a_degenerate_level_every_digit_comes_out(exponent):
     motion = motion_from((F(1), F(0)), (0, F(1, 4), spin), (F(3, 5), -spin * F(4, 5), F(4, 5)))
     assert_solves(motion, F(7, 3))
     assert_narrow(motion, F(10**6))
-
-
-def test_nearer_the_motion_is_refused_with_the_distance():
-    for exponent in (12, 100):
-        spin = F(1, 10**exponent)
-        with pytest.raises(NotInClass, match=r"degenerate but for [1-9].*, the distance"):
-            motion_from((F(1), F(0)), (0, F(1, 4), spin), (F(3, 5), -spin * F(4, 5), F(4, 5)))

@@ -10,6 +10,7 @@ from exact.test_goryachev_chaplygin import UP, motion_from, random_motion
 from heavytop.errors import OutOfReach
 from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplyginAttitude, _motion
 from heavytop.exact.flint.balls import ball, working_precision
+from heavytop.precision import cross, dot
 from support.proofs import assert_attitude, assert_meets, attitude_of
 
 F = Fraction
@@ -26,12 +27,6 @@ def test_the_azimuth_of_the_angular_momentum_is_proven_by_polynomials():
     context = fmpq_mpoly_ctx.get(["p", "q", "r", "g1", "g2", "g3", "c"], "lex")
     p, q, r, *gamma, c = context.gens()
     omega, up, moment, momentum = (p, q, r), tuple(gamma), (c, 0 * c, 0 * c), (4 * p, 4 * q, r)
-
-    def cross(x, y):
-        return tuple(x[i - 2] * y[i - 1] - x[i - 1] * y[i - 2] for i in range(3))
-
-    def dot(x, y):
-        return sum((one * other for one, other in zip(x, y, strict=True)), context.from_dict({}))
 
     body = [one + other for one, other in zip(cross(momentum, omega), cross(up, moment), strict=True)]
     space = [one + other for one, other in zip(body, cross(omega, momentum), strict=True)]

@@ -15,14 +15,7 @@ from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import working_precision
 from heavytop.measure.reference import reference
 from heavytop.top.heavy_top import HeavyTop, State
-from support.proofs import (
-    assert_meets,
-    assert_narrow,
-    assert_solves,
-    positive,
-    rational,
-    triple,
-)
+from support.proofs import assert_meets, assert_narrow, assert_overlap, assert_solves, positive, rational, triple
 
 F = Fraction
 TOP = HeavyTop((4, 4, 1), 1, (1, 0, 0))
@@ -62,7 +55,7 @@ def test_motions_that_tend_to_rest_are_elementary(start):
     enclosure = Validated(TOP, start)
     for time in (F(1, 3), F(-1)):
         assert_solves(motion, time)
-        assert all(a.overlaps(b) for a, b in zip(motion.state(time, 170), enclosure.state(time, 170), strict=True))
+        assert_overlap(motion.state(time, 170), enclosure.state(time, 170))
     for time in (FAR, -FAR):
         assert_narrow(motion, time)
         assert motion.state(time, 170)[3].overlaps(motion.state(3 * time, 170)[3])
@@ -91,7 +84,7 @@ def test_a_motion_goes_back_the_way_that_it_came(make):
             later = own.at(whole * (2 - share).numerator / share.denominator - since).state()
             for other in (back, later):
                 assert all((a + b).contains(0) for a, b in zip(here[:3], other[:3], strict=True))
-                assert all(a.overlaps(b) for a, b in zip(here[3:], other[3:], strict=True))
+                assert_overlap(here[3:], other[3:])
 
 
 @pytest.mark.parametrize("power", [1, 3, 10, 100, 300])
@@ -101,7 +94,7 @@ def test_directions_all_but_level_upright_or_hanging(power):
         begun = process_time()
         motion = GoryachevChaplyginRest(TOP, State((0, 0, 0), gamma))
         assert_narrow(motion, F(7, 3), 40)
-        assert all(a.overlaps(b) for a, b in zip(motion.state(FAR, 140), motion.state(FAR, 300), strict=True))
+        assert_overlap(motion.state(FAR, 140), motion.state(FAR, 300))
         with suppress(OutOfReach):
             motion.attitude(F(7, 3), 140)
         assert process_time() - begun < 5

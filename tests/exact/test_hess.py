@@ -17,13 +17,7 @@ from heavytop.measure.reference import reference
 from heavytop.precision import dot
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
-from support.proofs import (
-    assert_attitude,
-    assert_narrow,
-    assert_solves,
-    positive,
-    rational,
-)
+from support.proofs import assert_attitude, assert_narrow, assert_overlap, assert_solves, positive, rational
 
 F = Fraction
 TOP = HeavyTop((8, 6, 3), 1, (1, 0, 2))
@@ -161,8 +155,7 @@ def assert_answered(top, start, digits=40):
     with suppress(OutOfReach):
         solution = find(top, start)
         reference(top, start, [time], digits, attitude=dot(start.gamma, start.gamma) == 1)
-        pairs = zip(solution.state(time, 140), solution.state(time, 220), strict=True)
-        assert all(a.overlaps(b) for a, b in pairs)
+        assert_overlap(solution.state(time, 140), solution.state(time, 220))
     assert process_time() - begun < 10
 
 

@@ -15,6 +15,7 @@ from heavytop.exact.cases.kovalevskaya import Kovalevskaya
 from heavytop.exact.cases.lagrange import Lagrange, LagrangeGyrostat, SphericalTop
 from heavytop.exact.cases.one_interval import Steklov
 from heavytop.exact.cases.pendulum import Pendulum
+from heavytop.exact.cases.staude import Staude
 from heavytop.exact.cases.zhukovsky_volterra import ZhukovskyVolterra
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -36,6 +37,8 @@ OUTSIDE = [
     (GoryachevChaplygin, (G, 1, (1, 0, 1)), (("3/4", "1/2", 0), UP), "P c = 1"),
     (GoryachevChaplygin, (G, 1, (1, 0, 0)), (("3/4", "1/2", "1/7"), UP), "M·gamma = 1/7"),
     (GoryachevChaplygin, (G, 1, (1, 0, 0)), (("3/4", "1/2", "1/7"), (0, 0, 0)), r"gamma = \(0, 0, 0\)"),
+    (GoryachevChaplygin, (G, 1, (1, "1/3", 0)), ((0, 0, 0), ("3/5", 0, "4/5")), "both separated variables rest"),
+    (GoryachevChaplygin, (G, 1, (1, 0, 0)), ((0, "1/4", 0), ("3/5", 0, "4/5")), "both separated variables"),
     (GoryachevChaplyginRest, (G, 1, (1, 0, 0)), ((1, 0, 0), (1, 0, 0)), "M·gamma = 4"),
     (GoryachevChaplyginRest, (G, 1, (1, 0, 0)), ((1, 0, 1), SIDE), "G = 1"),
     (GoryachevChaplyginRest, (G, 1, (1, 0, 0)), ((0, 2, 0), ("4/5", 0, "3/5")), r"h\^2 <="),
@@ -61,6 +64,9 @@ OUTSIDE = [
     (Kovalevskaya, (B, 1, (1, 0, 1)), ((1, 2, 3), UP), "P c = 1"),
     (Kovalevskaya, (B, 1, (0, 0, 0)), ((1, 2, 3), UP), r"P r = \(0, 0, 0\)"),
     (Kovalevskaya, (B, 1, (1, 0, 0)), ((1, 2, 3), (0, 0, 0)), r"gamma = \(0, 0, 0\)"),
+    (Kovalevskaya, (B, 1, (1, 0, 0)), ((1, "1/2", "1/3"), ("3/4", 1, "1/5")), "xi != 0"),
+    (Kovalevskaya, (B, 1, (1, 0, 0)), (("-1/2", "1/2", -1), UP), "both separated variables rest at e = -1/2"),
+    (Kovalevskaya, (B, 1, (1, 0, 0)), ((-1, 0, -1), UP), "cubic .* has a double root"),
     (Lagrange, ((2, 1, 1), 1, UP), (UP, UP), "I1 - I2 = 1"),
     (Lagrange, (B, 1, (1, 0, 1)), (UP, UP), "P a = 1"),
     (LagrangeGyrostat, (B, 1, UP, (1, 0, 1)), ((1, 2, 3), ("3/5", 0, "4/5")), "k1 = 1"),
@@ -79,6 +85,9 @@ OUTSIDE = [
     (Sretensky, (G, 1, (1, 0, 0), (0, 1, 1)), (("3/4", "1/2", -1), UP), "k1 = k2 = 0, but k1 = 0, k2 = 1"),
     (Sretensky, ((3, 3, 1), 1, (1, 0, 0), UP), (("3/4", "1/2", -1), UP), "I1 - 4 I3 = -1"),
     (Sretensky, (G, 1, (1, 0, 0), (0, 0, 0)), (("3/4", "1/2", -1), UP), "M·gamma = -1"),
+    # Ω1 = Ω2 = γ3 = 0, a pendulum about the axis of the rotor
+    (Sretensky, (G, 1, (1, 0, 0), (0, 0, 2)), (UP, ("3/5", "4/5", 0)), "rests at 0"),
+    (Staude, ((3, 2, 1), 1, (1, 2, 3)), ((1, 0, 0), (1, 0, 0)), r"Omega' = gamma' = 0, but their components = \("),
     (Steklov, (S, 1, (1, 0, 1)), ((0, 4, 2), (-1, 0, 0)), "P b = 0, P c = 1"),
     (Steklov, ((1, "1/2", "3/4"), 1, (1, 0, 0)), ((0, 4, 2), (-1, 0, 0)), "I1, I2, I3 different"),
     (Steklov, (S, 1, ("45/32", 0, 0)), ((0, 4, "5/2"), (-1, 0, 0)), r"Omega3\^2 = .*, but the difference = 9/4"),

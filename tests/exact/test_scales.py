@@ -88,14 +88,10 @@ def mixed(rng):
     spin = number()
     steady = (spin, 0, weight * unit[2] / (first * spin))
     yield HeavyTop((2 * first, second, first), weight, (1, 0, 0)), State(steady, unit), HEAVY_TOP
-    w, n = complex_pair(number(), number()), complex_pair(number(), number())
+    w, n = ((number(), number()) for _ in range(2))
     gamma = times(times(w, w), (n[0] / (n[0] ** 2 + n[1] ** 2), -n[1] / (n[0] ** 2 + n[1] ** 2)))
     start = State((*w, number()), (first * gamma[0], first * gamma[1], number()))
     yield HeavyTop((2 * first, 2 * first, first), 1, (*n, 0)), start, HEAVY_TOP
-
-
-def complex_pair(first, second):
-    return first, second
 
 
 def times(a, b):

@@ -9,11 +9,19 @@ import pytest
 
 from heavytop.exact.cases.lagrange import Lagrange, SphericalTop
 from heavytop.exact.cases.pendulum import Pendulum
-from heavytop.exact.catalogue import find, matches
-from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.catalogue import find
 from heavytop.precision import cross, dot
 from heavytop.top.heavy_top import HeavyTop, State
-from support.proofs import assert_attitude, assert_meets, assert_narrow, assert_solves, positive, rational, triple
+from support.proofs import (
+    assert_attitude,
+    assert_meets,
+    assert_narrow,
+    assert_overlap,
+    assert_solves,
+    positive,
+    rational,
+    triple,
+)
 
 F = Fraction
 UNIT = (F(2, 3), F(-1, 3), F(2, 3))
@@ -28,7 +36,7 @@ def random_spherical(seed):
     return SphericalTop(HeavyTop(inertia, rng.choice((1, -2)), triple(rng)), State(triple(rng), triple(rng)))
 
 
-def random_tilted(seed, spherical):
+def random_tilted(seed, spherical=False):
     """A pendulum about an axis of the plane of the equal moments, or about any axis."""
     rng = random.Random(seed)
     i1, i3 = positive(rng), positive(rng)
@@ -39,26 +47,17 @@ def random_tilted(seed, spherical):
     return Pendulum(HeavyTop(inertia, 2, centre), State([rate * e for e in axis], gamma))
 
 
-@pytest.mark.parametrize("spherical", [False, True])
-@pytest.mark.parametrize("seed", range(12))
-def test_every_random_tilted_pendulum_solves_all_six_equations(seed, spherical):
-    motion, rng = random_tilted(seed, spherical), random.Random(seed)
-    assert_solves(motion, rational(rng, size=30))
-    assert_narrow(motion, FAR)
-    assert_attitude(motion, rational(rng))
-    assert isinstance(find(motion.top, motion.start), Pendulum)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("motion", [random_spherical(1), random_spherical(4), random_tilted(2, False)])
-def test_the_enclosure_holds_states_and_attitude(motion):
-    top, omega = motion.top, motion.start.omega
-    enclosure = Validated(top, motion.start)
-    for time in (F(3, 2), F(-2)):
-        pairs = zip(motion.state(time, 180), enclosure.state(time, 180), strict=True)
-        assert all(a.overlaps(b) for a, b in pairs)
-    if isinstance(motion, SphericalTop):
-        assert_meets(SphericalTop(top, State(omega, UNIT)), (F(3, 2), F(-2)))
+@pytest.mark.parametrize("seed", [1, 4])
+def test_the_enclosure_holds_the_attitude(seed):
+    motion = random_spherical(seed)
+    assert_meets(SphericalTop(motion.top, State(motion.start.omega, UNIT)), (F(3, 2), F(-2)))
+
+
+@pytest.mark.parametrize("spherical", [False, True])
+def test_the_catalogue_finds_tilted_pendulums(spherical):
+    motion = random_tilted(1, spherical)
+    assert isinstance(find(motion.top, motion.start), Pendulum)
 
 
 def test_a_spherical_top_with_its_centre_on_an_axis_is_lagranges():
@@ -67,9 +66,8 @@ def test_a_spherical_top_with_its_centre_on_an_axis_is_lagranges():
         top, start = HeavyTop((2, 2, 2), weight, (0, 0, 1)), State(("1/5", "1/3", -2), UNIT)
         plain, other = Lagrange(top, start), SphericalTop(top, start)
         for time in (F(7, 3), -FAR):
-            assert all(a.overlaps(b) for a, b in zip(plain.state(time, bits), other.state(time, bits), strict=True))
-            pairs = zip(plain.attitude(time, bits), other.attitude(time, bits), strict=True)
-            assert all(a.overlaps(b) for a, b in pairs)
+            assert_overlap(plain.state(time, bits), other.state(time, bits))
+            assert_overlap(plain.attitude(time, bits), other.attitude(time, bits))
 
 
 def test_a_rational_turn_of_the_body_turns_the_motion():
@@ -102,18 +100,10 @@ def test_directions_all_but_along_an_axis(power):
     motion = SphericalTop(top, State(("1/5", "1/3", -2), UNIT))
     begun = process_time()
     assert_narrow(motion, F(7, 3), 40)
-    assert all(a.overlaps(b) for a, b in zip(motion.state(F(1), 140), motion.state(F(1), 300), strict=True))
+    assert_overlap(motion.state(F(1), 140), motion.state(F(1), 300))
     tilted = Pendulum(HeavyTop((2, 2, 1), 1, (0, 0, 1)), State((1, size, 0), (0, 0, 1)))
     assert_narrow(tilted, F(7, 3), 40)
     assert process_time() - begun < 5
-
-
-def test_several_forms_of_one_motion_agree():
-    tilted = random_tilted(2, True)
-    forms = list(matches(tilted.top, tilted.start))
-    assert {type(form) for form in forms} >= {Pendulum, SphericalTop}
-    states = [form.state(F(13, 3), 200) for form in forms]
-    assert all(a.overlaps(b) for other in states[1:] for a, b in zip(states[0], other, strict=True))
 
 
 def test_the_axis_of_a_tilted_pendulum_is_any_in_the_plane_of_equal_moments():

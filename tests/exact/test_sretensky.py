@@ -6,7 +6,6 @@ from fractions import Fraction
 import pytest
 from flint import fmpq_mpoly_ctx
 
-from heavytop.errors import LevelNotDone
 from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplygin, Sretensky
 from heavytop.exact.catalogue import find
 from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
@@ -104,9 +103,3 @@ def test_a_variable_may_rest_at_a_double_root(place):
     assert_narrow(motion, F(10**6))
     assert all(isinstance(form.line.variables[0 if place > 0 else 1], Rest) for form in motion.made.values())
     assert_attitude(motion, F(7, 3))
-
-
-def test_the_pendulum_about_the_rotors_axis_is_left_to_the_enclosure():
-    """Ω1 = Ω2 = γ3 = 0: a separated variable rests at 0."""
-    with pytest.raises(LevelNotDone, match="rests at 0"):
-        motion_from((F(1), F(0)), 2, (F(0), F(0), F(1)), (F(3, 5), F(4, 5), 0))

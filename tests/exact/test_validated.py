@@ -1,17 +1,17 @@
 """Validated enclosures hold the true motion and are narrow."""
 
-import json
 import random
 from fractions import Fraction
-from pathlib import Path
 from time import process_time
 
 import pytest
 from flint import arb
 
+from heavytop.cases import CASES
 from heavytop.errors import InputError, OutOfReach
 from heavytop.exact.cases.delone import DeloneHomoclinic
 from heavytop.exact.cases.ershkov_partial import ErshkovPartial
+from heavytop.exact.catalogue import find
 from heavytop.exact.enclosure import run
 from heavytop.exact.enclosure import step as enclosure
 from heavytop.exact.enclosure.run import Validated
@@ -20,14 +20,14 @@ from heavytop.exact.flint.balls import midpoint, radius, relative_bits, working_
 from heavytop.measure.certify import bits_of
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
+from support.helpers import VECTORS, start_of, top_of
+from support.proofs import assert_overlap, assert_solves
 
-VECTORS = json.loads((Path(__file__).parents[1] / "data" / "vectors.json").read_text(encoding="utf-8"))
 BITS_OF_60_DIGITS = 200
 
 
 def motion(vector, system=HEAVY_TOP):
-    top = HeavyTop(vector["inertia"], vector["weight"], vector["centre"])
-    return Validated(top, State(vector["omega"], vector["gamma"]), system)
+    return Validated(top_of(vector), start_of(vector), system)
 
 
 def holds(balls, vector):
@@ -39,12 +39,13 @@ def holds(balls, vector):
     )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("vector", VECTORS, ids=lambda v: v["name"])
 def test_every_reference_state_is_inside_its_ball_to_60_digits(vector):
-    balls = motion(vector).state(Fraction(vector["time"]), BITS_OF_60_DIGITS)
-    assert min(map(relative_bits, balls)) >= BITS_OF_60_DIGITS
-    assert holds(balls, vector)
+    """Of the enclosure, and of the closed form where there is one."""
+    for solution in (motion(vector), find(top_of(vector), start_of(vector))):
+        balls = solution.state(Fraction(vector["time"]), BITS_OF_60_DIGITS)
+        assert min(map(relative_bits, balls)) >= BITS_OF_60_DIGITS
+        assert holds(balls, vector)
 
 
 @pytest.mark.slow
@@ -57,29 +58,11 @@ def test_a_wrong_sign_in_the_field_is_caught_by_the_reference_states():
     assert not holds(balls, VECTORS[0])
 
 
-def test_the_series_solves_the_equations_and_starts_at_the_state():
-    solution = motion(VECTORS[0])
-    with working_precision(200):
-        series = solution.series(Fraction(5, 3), 6, 150)
-        p = solution.parameters
-        for rate, field in zip([y.derivative() for y in series], HEAVY_TOP.field(_balls(p), series), strict=True):
-            difference = rate - field
-            for n in range(5):
-                assert difference[n].contains(0)
-                assert difference[n].rad() < 1e-38
-    for y, ball in zip(series, solution.state(Fraction(5, 3), 150), strict=True):
-        assert y[0].overlaps(ball)
-    later = solution.state(Fraction(5, 3) + Fraction(1, 1000), 150)
-    with working_precision(200):
-        for y, ball in zip(series, later, strict=True):
-            assert abs(sum((y[n] / 1000**n for n in range(6)), arb(0)) - ball) < 1e-15
-
-
-def _balls(p):
-    def of(values):
-        return [arb(v.numerator) / v.denominator for v in values]
-
-    return p._replace(inertia=of(p.inertia), moment=of(p.moment))
+@pytest.mark.parametrize("name", ["generic", "heavy-gyrostat"])
+def test_the_series_solves_the_equations_and_starts_at_the_state(name):
+    solution, time = Validated(CASES[name].top, CASES[name].start, CASES[name].system), Fraction(5, 3)
+    assert_solves(solution, time, length=12)
+    assert_overlap([y[0] for y in solution.series(time, 2, 150)], solution.state(time, 150))
 
 
 def test_taylor_coefficients_of_a_known_motion_obey_the_a_priori_bound():
