@@ -13,10 +13,10 @@ from heavytop.features.claims.algebra.combinations import nonnegative_combinatio
 from heavytop.features.claims.algebra.conditions import solve_relations
 from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.structure import Defined, at_values, rate_along
-from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
-from heavytop.top.equations import HEAVY_TOP
-from support.claim_tables import energy
+from support.claim_tables import Table, audited, energy, integral, top, upright
 
+ENERGY = "(3*Omega1^2 + 2*Omega2^2 + Omega3^2)"
+"""Of the top of Euler, twice."""
 T = sympy.Symbol("t", real=True)
 A, B, C = sympy.symbols("a b c", real=True)
 P, Q = sympy.symbols("p q", positive=True)
@@ -35,6 +35,10 @@ def test_a_part_of_the_family_is_decided_and_nothing_false_holds():
 
 def said(x: str, **changes: object) -> str:
     return energy(x, **changes).verdict
+
+
+def holds(table: Table) -> bool:
+    return audited(table).verdict == "holds"
 
 
 # --- orders ---------------------------------------------------------------------------------------------------------
@@ -207,11 +211,11 @@ def test_sums_of_inverse_functions_are_what_they_are_and_not_off_by_pi(x, given,
 
 def test_a_sum_that_jumps_inside_the_domain_proves_nothing():
     """2 atan t = atan(2 t/(1 − t²)) for |t| < 1 only; the samples lie there."""
-    top = {"inertia": ["1", "1", "2"], "weight": "1", "centre": ["0", "0", "3"]}
-    for spin, holds in (("2*atan(t) - atan(2*t/(1 - t^2))", False), ("2*atan(t) - 2*asin(t/sqrt(1 + t^2))", True)):
-        motion = {"omega": ["0", "0", f"1 + {spin}"], "gamma": ["0", "0", "1"]}
-        table = {"name": "x", "kind": "motion", "times": ["1/3"], "top": top, "motion": motion}
-        assert (audit_claim(claim_from_table(table, "x"), HEAVY_TOP).verdict == "holds") is holds
+    for spin, expected in (
+        ("2*atan(t) - atan(2*t/(1 - t^2))", False),
+        ("2*atan(t) - 2*asin(t/sqrt(1 + t^2))", True),
+    ):
+        assert holds(upright(f"1 + {spin}", top("1 1 2", "0 0 3"), times=["1/3"])) is expected
 
 
 # --- saturation -----------------------------------------------------------------------------------------------------
@@ -240,47 +244,26 @@ def test_a_factor_that_is_never_0_is_divided_out_and_no_other(relation, assume, 
 @pytest.mark.slow
 def test_what_is_only_kept_from_0_along_a_motion_is_not_divided_out():
     """sqrt(E) needs E ≥ 0; on E Ω1 = 0 the motions with E = 0 have any Ω1."""
-    energy = "(3*Omega1^2 + 2*Omega2^2 + Omega3^2)"
-    table = {
-        "name": "x",
-        "kind": "integral",
-        "top": {"inertia": ["3", "2", "1"], "weight": "0", "centre": ["0", "1", "0"]},
-        "integral": {"value": f"sqrt({energy} - 5)*0 + Omega1", "where": [f"({energy} - 5)*Omega1"]},
-    }
-    assert audit_claim(claim_from_table(table, "x"), HEAVY_TOP).verdict != "holds"
+    table = integral(f"sqrt({ENERGY} - 5)*0 + Omega1", top(weight="0"), [f"({ENERGY} - 5)*Omega1"])
+    assert not holds(table)
 
 
 @pytest.mark.slow
 def test_a_relation_of_hess_needs_no_sign_of_its_centre():
-    table = {
-        "name": "Hess",
-        "kind": "relation",
-        "parameters": {"a": "9", "b": "5", "c": "4", "x": "4", "z": "3"},
-        "relations": ["a*(b - c)*x^2 - c*(a - b)*z^2"],
-        "top": {"inertia": ["a", "b", "c"], "weight": "1", "centre": ["x", "0", "z"]},
-        "integral": {"value": "a*x*Omega1 + c*z*Omega3"},
-    }
-    assert audit_claim(claim_from_table(table, "x"), HEAVY_TOP).verdict == "holds"
+    given = {"kind": "relation", "parameters": {"a": "9", "b": "5", "c": "4", "x": "4", "z": "3"}}
+    value, relations = "a*x*Omega1 + c*z*Omega3", ["a*(b - c)*x^2 - c*(a - b)*z^2"]
+    assert holds(integral(value, top("a b c", "x 0 z"), relations=relations, **given))
     # without the relation, or with another sign, it is none
-    assert audit_claim(claim_from_table({**table, "relations": []}, "x"), HEAVY_TOP).verdict != "holds"
-    wrong = {**table, "integral": {"value": "a*x*Omega1 - c*z*Omega3"}}
-    assert audit_claim(claim_from_table(wrong, "x"), HEAVY_TOP).verdict != "holds"
+    assert audited(integral(value, top("a b c", "x 0 z"), **given)).verdict == "undecided"
+    assert not holds(integral(value.replace("+", "-"), top("a b c", "x 0 z"), relations=relations, **given))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("divisor", "holds"), [("a - b", True), ("a - 2*b", False), ("2 - a", False)])
-def test_a_constant_of_parameters_is_no_gap_that_can_be_removed(divisor, holds):
+@pytest.mark.parametrize(("divisor", "expected"), [("a - b", True), ("a - 2*b", False), ("2 - a", False)])
+def test_a_constant_of_parameters_is_no_gap_that_can_be_removed(divisor, expected):
     """A constant that is 0 at some parameters is 0 there all along every motion."""
-    energy = "(3*Omega1^2 + 2*Omega2^2 + Omega3^2)"
     given = {"parameters": {"a": "5", "b": "4"}, "assume": ["a > b", "b > 0"]}
-    table = {
-        "name": "x",
-        "kind": "integral",
-        "top": {"inertia": ["3", "2", "1"], "weight": "0", "centre": ["0", "1", "0"]},
-        "integral": {"value": f"{energy}/({divisor})*Omega1/Omega1"},
-        **given,
-    }
-    assert (audit_claim(claim_from_table(table, "x"), HEAVY_TOP).verdict == "holds") is holds
+    assert holds(integral(f"{ENERGY}/({divisor})*Omega1/Omega1", top(weight="0"), **given)) is expected
 
 
 # --- definitions ----------------------------------------------------------------------------------------------------
@@ -299,7 +282,7 @@ def test_a_definition_has_the_rate_and_the_values_of_its_formula():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("link", "end", "holds"),
+    ("link", "end", "expected"),
     [
         ("d{0}*(2 + t^2 + sin(t))/(2 + t^2 + sin(t))", "d25/(1 + t^2)", True),
         ("sqrt(1 + d{0}^2)", "d25/sqrt(25 + (1 + t^2)^2)", True),
@@ -307,13 +290,11 @@ def test_a_definition_has_the_rate_and_the_values_of_its_formula():
         ("d{0} + sin(t)^2 + cos(t)^2", "d25 - t^2 - 25", True),
     ],
 )
-def test_a_formula_through_25_definitions_is_carried(link, end, holds):
-    definitions = {"d0": "1 + t^2"} | {f"d{i + 1}": link.format(f"{i}").replace("d{0}", f"d{i}") for i in range(25)}
-    top = {"inertia": ["1", "2", "3"], "weight": "1", "centre": ["0", "0", "1"]}
+def test_a_formula_through_25_definitions_is_carried(link, end, expected):
+    definitions = {"d0": "1 + t^2"} | {f"d{i + 1}": link.format(i) for i in range(25)}
     omega = [f"2/cosh(t)*({end})", "0", "0"]
     motion = {"omega": omega, "gamma": ["0", "-2*tanh(t)/cosh(t)", "1 - 2/cosh(t)^2"]}
-    table = {"name": "x", "kind": "motion", "top": top, "motion": motion, "definitions": definitions}
-    assert (audit_claim(claim_from_table(table, "x"), HEAVY_TOP).verdict == "holds") is holds
+    assert holds(upright("", top("1 2 3", "0 0 1"), motion=motion, definitions=definitions)) is expected
 
 
 @pytest.mark.slow
@@ -321,14 +302,7 @@ def test_a_formula_through_25_definitions_is_carried(link, end, holds):
 def test_a_function_of_first_integrals_through_definitions_is_constant(extra, steps, verdict):
     definitions = {"d0": "3*Omega1^2 + 2*Omega2^2 + Omega3^2" + extra}
     definitions |= {f"d{i + 1}": f"d{i}^2/(1 + d{i}^2) + d{i}" for i in range(steps)}
-    table = {
-        "name": "x",
-        "kind": "integral",
-        "top": {"inertia": ["3", "2", "1"], "weight": "0", "centre": ["0", "1", "0"]},
-        "definitions": definitions,
-        "integral": {"value": f"d{steps}"},
-    }
-    assert audit_claim(claim_from_table(table, "x"), HEAVY_TOP).verdict == verdict
+    assert audited(integral(f"d{steps}", top(weight="0"), definitions=definitions)).verdict == verdict
 
 
 # --- what is no reason ----------------------------------------------------------------------------------------------
@@ -349,24 +323,19 @@ def test_a_root_does_not_make_what_is_under_it_positive():
 
 @pytest.mark.parametrize(("assumed", "expected"), [([], "undecided"), (["sqrt(a) > 1"], "holds")])
 def test_an_assumption_makes_its_own_roots_real_and_a_formula_does_not(assumed, expected):
-    table = {
-        "kind": "motion",
-        "name": "x",
-        "assume": assumed,
-        "parameters": {"a": ["4", "9"]},
-        "top": {"inertia": ["1", "1", "2"], "weight": "0", "centre": ["0", "0", "0"]},
-        "motion": {"omega": ["0", "0", "sqrt(a) + log(3) + log(2)"], "gamma": ["0", "0", "1"]},
-    }
-    assert audit_claim(claim_from_table(table, "x"), HEAVY_TOP).verdict == expected
+    table = upright("sqrt(a) + log(3) + log(2)", top("1 1 2", "0 0 0", "0"), assume=assumed)
+    assert audited(table | {"parameters": {"a": ["4", "9"]}}).verdict == expected
 
 
 def test_an_exponential_below_1_is_no_lower_bound_above_1():
     small = sympy.exp(-P)
-    for said_ in (
-        Assumptions(T, positive=(P,), facts=(B - small,)),
-        Assumptions(T, positive=(P,), greater=((B, small),)),
-    ):
-        assert _signs(said_, [small], B - 1, B * small - 1, B, small - 2) == [0, 0, 1, -1]
+    for known in ({"facts": (B - small,)}, {"greater": ((B, small),)}):
+        assert _signs(Assumptions(T, positive=(P,), **known), [small], B - 1, B * small - 1, B, small - 2) == [
+            0,
+            0,
+            1,
+            -1,
+        ]
 
 
 @pytest.mark.parametrize(
@@ -380,10 +349,8 @@ def test_an_exponential_below_1_is_no_lower_bound_above_1():
 )
 def test_halves_that_a_divisor_parts_have_sums_of_arcs_of_their_own(value, expected):
     """Integrals of the top of Lagrange that spins either way; the states of the file spin one way."""
-    states = [["1", "2", spin, "3/5", "0", "4/5"] for spin in ("2", "3/7", "5")]
-    table = {"kind": "integral", "name": "x", "integral": {"value": value, "states": states}}
-    table["top"] = {"inertia": ["2", "2", "1"], "weight": "1", "centre": ["0", "0", "1"]}
-    assert audit_claim(claim_from_table(table, "x"), HEAVY_TOP).verdict == expected
+    states = [f"1 2 {spin} 3/5 0 4/5" for spin in ("2", "3/7", "5")]
+    assert audited(integral(value, top("2 2 1", "0 0 1"), states=states)).verdict == expected
 
 
 @pytest.mark.slow

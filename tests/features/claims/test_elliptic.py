@@ -13,13 +13,12 @@ from heavytop.errors import InputError
 from heavytop.features.claims.algebra.elliptic import cn, dn, sn
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Assumptions, Field
-from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
+from support.claim_tables import audited, integral, open_conditions, top
 
 T = sympy.Symbol("t", real=True)
 M = sympy.Symbol("m", real=True)
 # Euler's free body, I1 > I2 > I3 and 2 T I2 < G²: the parameter lies between 0 and 1
 EULER: dict[str, Any] = {
-    "name": "euler",
     "kind": "motion",
     "assume": ["A > B", "B > C", "C > 0", "E > 0", "H > 0", "H > E*B", "E*A > H"],
     "parameters": {"A": ["3", "5"], "B": ["2", "3"], "C": ["1", "2"], "E": ["1", "3/2"], "H": ["5/2", "6"]},
@@ -30,7 +29,7 @@ EULER: dict[str, Any] = {
         "m2": "-sqrt(B*(A*E - H)/(A - B))*sn(rate*t, m)",
         "m3": "sqrt(C*(A*E - H)/(A - C))*cn(rate*t, m)",
     },
-    "top": {"inertia": ["A", "B", "C"], "weight": "0", "centre": ["0", "0", "0"]},
+    "top": top("A B C", "0 0 0", "0"),
     "motion": {"omega": ["m1/A", "m2/B", "m3/C"], "gamma": ["m1/sqrt(H)", "m2/sqrt(H)", "m3/sqrt(H)"]},
 }
 
@@ -40,7 +39,7 @@ NUMBERS = {"A": "3", "B": "2", "C": "1", "E": "1", "H": "(5/2)"}
 
 
 def verdict(table: dict[str, Any]) -> str:
-    return audit_claim(claim_from_table(table, "claim")).verdict
+    return audited(table).verdict
 
 
 def changed(**definitions: str) -> dict[str, Any]:
@@ -103,15 +102,16 @@ def test_eulers_motion_holds_for_every_body() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "definitions",
+    ("definitions", "verdicts"),
     [
-        {"m2": "sqrt(B*(A*E - H)/(A - B))*sn(rate*t, m)"},
-        {"m": "(A*E - H)*(B - C)/((A - B)*(H - C*E))*99/100"},
-        {"m3": "sqrt(C*(A*E - H)/(A - C))*dn(rate*t, m)"},
+        ({"m2": "sqrt(B*(A*E - H)/(A - B))*sn(rate*t, m)"}, {"refuted"}),
+        ({"m": "(A*E - H)*(B - C)/((A - B)*(H - C*E))*99/100"}, {"refuted"}),
+        ({"m3": "sqrt(C*(A*E - H)/(A - C))*dn(rate*t, m)"}, {"refuted"}),
+        ({"m": "sin(t)^2"}, {"refuted", "undecided"}),  # a parameter that moves
     ],
 )
-def test_a_planted_fault_is_refuted(definitions: dict[str, str]) -> None:
-    assert verdict(in_numbers(changed(**definitions))) == "refuted"
+def test_a_planted_fault_is_refuted(definitions: dict[str, str], verdicts: set[str]) -> None:
+    assert verdict(in_numbers(changed(**definitions))) in verdicts
 
 
 @pytest.mark.slow
@@ -122,35 +122,23 @@ def test_a_fault_planted_in_the_motion_of_every_body_is_refuted() -> None:
 @pytest.mark.slow
 def test_without_the_range_of_the_parameter_it_is_undecided_and_says_so() -> None:
     loose = EULER | {"assume": [each for each in EULER["assume"] if each != "H > E*B"]}
-    report = audit_claim(claim_from_table(loose, "claim"))
+    report = audited(loose)
     assert report.verdict == "undecided"
-    open_ones = {condition.text for row in report.rows for condition in row.conditions if not condition.discharged}
-    assert any("≤ 1" in text for text in open_ones)
-
-
-@pytest.mark.slow
-def test_a_parameter_that_moves_proves_nothing() -> None:
-    assert verdict(in_numbers(changed(m="sin(t)^2"))) != "holds"
+    assert "≤ 1" in open_conditions(report)
 
 
 @pytest.mark.parametrize("value", ["Omega3/cn(1, 1/2)*cn(1, 1/2)", "Omega3*dn(Omega1, 1/2)/dn(Omega1, 1/2)"])
 def test_divisors_that_are_never_0_do_no_harm(value: str) -> None:
-    table = {
-        "name": "spin",
-        "kind": "integral",
-        "top": {"inertia": ["2", "2", "1"], "weight": "1", "centre": ["0", "0", "1"]},
-        "integral": {"value": value},
-    }
-    assert verdict(table) == "holds"
+    assert verdict(integral(value, top("2 2 1", "0 0 1"))) == "holds"
 
 
 @pytest.mark.parametrize("formula", ["sn(t)", "sn(t, 1/2, 3)", "sn", "cn()", "dn t"])
 def test_wrong_calls_are_refused(formula: str) -> None:
     with pytest.raises(InputError):
-        claim_from_table(changed(m1=formula), "claim")
+        audited(changed(m1=formula))
 
 
 def test_an_unknown_name_lists_the_functions() -> None:
     with pytest.raises(InputError, match="unknown name 'sd'") as error:
-        claim_from_table(changed(m1="sd(t, 1/2)"), "claim")
+        audited(changed(m1="sd(t, 1/2)"))
     assert "sn, cn, dn" in error.value.remedy

@@ -24,9 +24,8 @@ from heavytop.features.claims.algebra.ring import used
 from heavytop.features.claims.algebra.signs import Sign
 from heavytop.features.claims.algebra.statement import AFTER, ALL, BEFORE, Domain, Flow, Formulas, Setting, Statement
 from heavytop.features.claims.algebra.structure import sign_of as sign_by_structure
-from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.features.claims.audit.judge import judge
-from heavytop.top.equations import system
+from support.claim_tables import audited, integral, top
 
 T, A = sympy.Symbol("t", real=True), sympy.Symbol("a", real=True)
 P = sympy.Symbol("p", positive=True)
@@ -469,32 +468,21 @@ def test_a_place_is_one_only_where_the_relations_are_proven_to_be_0() -> None:
         assert len(list(setting.sample_points(Statement("1", 1, "smooth", domain, T, "")))) == expected
 
 
-def audited(about: str, value: str, **changes: object):
-    return audited_as("integral", about, {"value": value}, **changes)
-
-
-def audited_as(kind: str, about: str, said: dict, **changes: object):
-    top = {"inertia": ["3", "2", "1"], "weight": "1", "centre": ["0", "1", "0"], **changes.pop("top", {})}
-    return audit_claim(
-        claim_from_table({"name": "x", "kind": kind, "top": top, kind: said, **changes}, "x"), system(about)
-    )
-
-
-def test_what_is_above_a_negative_number_is_not_positive() -> None:
-    given = {"parameters": {"a": ["1/2"]}, "assume": ["a > -1"]}
-    assert audited("heavy_top", "(sqrt(a^2) - a)*Omega1", **given).verdict == "undecided"
-    given["assume"] = ["a > 0"]
-    assert audited("heavy_top", "(sqrt(a^2) - a)*Omega1", **given).verdict == "holds"
+@pytest.mark.parametrize(("bound", "verdict"), [("a > -1", "undecided"), ("a > 0", "holds")])
+def test_what_is_above_a_negative_number_is_not_positive(bound: str, verdict: str) -> None:
+    table = integral("(sqrt(a^2) - a)*Omega1", top(), parameters={"a": ["1/2"]}, assume=[bound])
+    assert audited(table).verdict == verdict
 
 
 @pytest.mark.parametrize(
-    ("kind", "said"),
+    "claim",
     [
-        ("integral", {"value": "Omega1*0 + gamma1^2 + gamma2^2 + gamma3^2"}),
-        ("motion", {"omega": ["0", "0", "0"], "gamma": ["0", "1", "0"]}),
+        {"kind": "integral", "integral": {"value": "Omega1*0 + gamma1^2 + gamma2^2 + gamma3^2"}},
+        {"kind": "motion", "motion": {"omega": ["0", "0", "0"], "gamma": ["0", "1", "0"]}},
     ],
+    ids=["integral", "motion"],
 )
-def test_what_the_rotor_needs_is_asked_of_the_gyrostat_alone(kind: str, said: dict) -> None:
+def test_what_the_rotor_needs_is_asked_of_the_gyrostat_alone(claim: dict) -> None:
     for about, asked in (("gyrostat", True), ("heavy_top", False)):
-        found = audited_as(kind, about, said, top={"rotor": "1/a"}, parameters={"a": "2"})
+        found = audited(claim | {"top": top(rotor="1/a"), "parameters": {"a": "2"}}, about)
         assert ("a ≠ 0" in {c.text for row in found.rows for c in row.conditions}) is asked

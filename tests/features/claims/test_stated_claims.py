@@ -9,14 +9,9 @@ from rich.console import Console
 
 import stated_claims
 from heavytop.errors import InputError
-from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.features.claims.audit.judge import Audit
 from heavytop.features.claims.text import audit_text
-from support.claim_tables import rotation
-
-
-def audited(table: dict[str, Any]) -> Audit:
-    return audit_claim(claim_from_table({"name": "claim"} | table, "claim"))
+from support.claim_tables import audited, rotation
 
 
 def spinning(rate: str, assume: list[str], **parts: Any) -> Audit:

@@ -11,8 +11,7 @@ import sympy
 from heavytop.errors import InputError
 from heavytop.features.claims.algebra.elliptic import wp, wpprime
 from heavytop.features.claims.algebra.evaluate import evaluate
-from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
-from support.claim_tables import open_conditions, rotation
+from support.claim_tables import audited, integral, open_conditions, rotation, top
 
 U, G2, G3 = sympy.symbols("u g2 g3", real=True)
 
@@ -75,10 +74,9 @@ def test_balls_of_weierstrass_functions_satisfy_their_equation_and_begin_as_thei
     assert evaluate(equation, far, 192).contains(0)
 
 
-def _integral(value: str, inertia: list[Any], **parts: Any) -> str:
-    top = {"inertia": inertia, "weight": "1", "centre": ["1", "0", "2"], **parts.pop("top", {})}
-    table = {"name": "x", "kind": "integral", "top": top, "integral": {"value": value}, **parts}
-    return audit_claim(claim_from_table(table, "x")).verdict
+def _integral(value: str, inertia: list[Any], rotor: Any = None, **parts: Any) -> str:
+    of = top("", "1 0 2") | {"inertia": inertia} | ({"rotor": rotor} if rotor else {})
+    return audited(integral(value, of, **parts)).verdict
 
 
 _FULL = "(3*Omega1 + Omega3/2)*gamma1 + 5*Omega2*gamma2 + (6*Omega3 + Omega1/2)*gamma3"
@@ -105,11 +103,8 @@ def test_the_area_integral_of_any_tensor_with_any_rotor() -> None:
         "(A*Omega1 + F*Omega2 + E*Omega3 + 1)*gamma1 + (F*Omega1 + B*Omega2 + D*Omega3 + 2)*gamma2"
         " + (E*Omega1 + D*Omega2 + C*Omega3 + 3)*gamma3"
     )
-    top = {"rotor": ["1", "2", "3"]}
-    assert _integral(value, ["A", "B", "C", "F", "E", "D"], parameters=parameters, top=top) == "holds"
-    assert _integral(value.replace("+ 3)", "+ 2)"), ["A", "B", "C", "F", "E", "D"], parameters=parameters, top=top) == (
-        "refuted"
-    )
+    for text, verdict in ((value, "holds"), (value.replace("+ 3)", "+ 2)"), "refuted")):
+        assert _integral(text, list("ABCFED"), ["1", "2", "3"], parameters=parameters) == verdict
 
 
 @pytest.mark.parametrize(
