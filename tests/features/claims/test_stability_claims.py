@@ -10,47 +10,37 @@ import pytest
 import sympy
 
 from heavytop.errors import InputError
-from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.features.claims.audit.judge import Audit
 from heavytop.top.equations import HEAVY_TOP, Parameters
+from support.claim_tables import Table, audited, top
 
 AXES = {"I1": ["3", "5/2"], "I2": ["2", "9/4"], "I3": ["3/2", "1"], "w": ["1", "2"]}
 ORDERED = ["I1 > I2 > I3", "w != 0"]
-UNITS = (("1", "0", "0"), ("0", "1", "0"), ("0", "0", "1"))
+UNITS = ("1 0 0", "0 1 0", "0 0 1")
 LAGRANGE = {"I1": ["1", "2"], "I3": ["1/2", "1"], "P": ["1", "2"], "c": ["1", "1/2"]}
 POSITIVE = ["P > 0", "c > 0"]
 
 
-def claim(
-    stable: object,
-    assume: list[str],
-    parameters: dict[str, Any],
-    inertia: object,
-    omega: object,
-    gamma: object,
-    **more: Any,
-) -> dict[str, Any]:
-    top = {"inertia": inertia, "weight": more.pop("weight", "0"), "centre": more.pop("centre", ["0", "0", "0"])}
-    named = {"name": "x", "kind": "stability", "stable": stable, "assume": assume, "parameters": parameters}
-    return {**named, "top": top, "motion": {"omega": omega, "gamma": gamma}, **more}
+def claim(stable: object, assume: list[str], parameters: Table, of: Table, omega: str, gamma: str) -> Table:
+    """The claim that a steady motion is stable, or is not."""
+    named = {"kind": "stability", "stable": stable, "assume": assume, "parameters": parameters}
+    return {**named, "top": of, "motion": {"omega": omega.split(), "gamma": gamma.split()}}
 
 
-def audit(*args: Any, **more: Any) -> Audit:
-    return audit_claim(claim_from_table(claim(*args, **more), "x"))
+def audit(*args: Any) -> Audit:
+    return audited(claim(*args))
 
 
 def turning(axis: int, stable: bool, assume: list[str] = ORDERED, sign: str = "", **parameters: list[str]) -> Audit:
     """About an axis of a free body, γ along or against Ω."""
-    omega = [u.replace("1", "w") for u in UNITS[axis]]
-    gamma = [u.replace("1", f"{sign}1") for u in UNITS[axis]]
-    return audit(stable, assume, AXES | parameters, ["I1", "I2", "I3"], omega, gamma)
+    omega, gamma = UNITS[axis].replace("1", "w"), UNITS[axis].replace("1", f"{sign}1")
+    return audit(stable, assume, AXES | parameters, top("I1 I2 I3", "0 0 0", "0"), omega, gamma)
 
 
 def on_axis(stable: bool, assume: list[str], spins: list[str], up: str = "1") -> Audit:
     """Lagrange's top with its axis upright."""
-    inertia, centre = ["I1", "I1", "I3"], ["0", "0", "c"]
-    parameters = LAGRANGE | {"w": spins}
-    return audit(stable, assume, parameters, inertia, ["0", "0", "w"], ["0", "0", up], weight="P", centre=centre)
+    of = top("I1 I1 I3", "0 0 c", "P")
+    return audit(stable, assume, LAGRANGE | {"w": spins}, of, "0 0 w", f"0 0 {up}")
 
 
 def growth(inertia: list[Fraction], moment: list[Fraction], state: list[Fraction]) -> mpmath.mpf:
@@ -82,10 +72,10 @@ def test_the_theorem_in_any_order_of_the_axes_is_that_of_the_eigenvalues(order: 
     parameters = {name: [str(value)] for name, value in zip(("I1", "I2", "I3"), moments, strict=True)} | {"w": ["-7/3"]}
     inertia = [moments[int(name[1]) - 1] for name in order]
     for axis, unit in enumerate(UNITS):
-        state = [Fraction(u) * w for w in (Fraction(-7, 3), 1) for u in unit]
+        state = [Fraction(u) * w for w in (Fraction(-7, 3), 1) for u in unit.split()]
         grows = growth(inertia, [Fraction(0)] * 3, state) > 1e-8
-        omega = [u.replace("1", "w") for u in unit]
-        assert audit(not grows, ORDERED, parameters, list(order), omega, list(unit)).verdict == "holds"
+        of = top(" ".join(order), "0 0 0", "0")
+        assert audit(not grows, ORDERED, parameters, of, unit.replace("1", "w"), unit).verdict == "holds"
         assert grows == (order[axis] == "I2")
 
 
@@ -118,10 +108,8 @@ def test_the_sleeping_top_at_its_condition_and_beyond() -> None:
     assert on_axis(False, [*POSITIVE, slow, "w != 0", "2*I1 > I3"], ["1/10", "-1/5"]).verdict == "holds"
     assert on_axis(True, [*POSITIVE, slow], ["1/10", "-1/5"]).verdict == "refuted"
     assert on_axis(True, POSITIVE, ["1", "-2"], up="-1").verdict == "holds"
-    top = {"weight": "1", "centre": list(UNITS[2])}
     for stable in (True, False):
-        at_equality = audit(stable, [], {}, ["1", "1", "1"], ["0", "0", "2"], list(UNITS[2]), **top)
-        assert at_equality.verdict == "undecided"
+        assert audit(stable, [], {}, top("1 1 1", "0 0 1"), "0 0 2", "0 0 1").verdict == "undecided"
 
 
 @pytest.mark.slow
@@ -142,8 +130,9 @@ def test_a_domain_that_reaches_the_edge_of_the_theorem_is_undecided(axis: int, s
 @pytest.mark.slow
 def test_about_an_axis_of_the_equator_of_a_symmetric_body_omega_drifts() -> None:
     parameters = {"I1": ["2"], "I3": ["1"], "w": ["1"]}
-    for omega, gamma in ((["w", "0", "0"], UNITS[0]), (["3*w", "4*w", "0"], ["3/5", "4/5", "0"])):
-        assert audit(True, ["I1 > I3", "w > 0"], parameters, ["I1", "I1", "I3"], omega, gamma).verdict == "refuted"
+    for omega, gamma in (("w 0 0", "1 0 0"), ("3*w 4*w 0", "3/5 4/5 0")):
+        of = top("I1 I1 I3", "0 0 0", "0")
+        assert audit(True, ["I1 > I3", "w > 0"], parameters, of, omega, gamma).verdict == "refuted"
     (stability,) = [row for row in turning(0, True, ["I1 >= I2", "I2 > I3", "w > 0"]).rows if row.holds is False]
     witness = {name: Fraction(value) for name, value in stability.witness["parameters"].items()}
     assert witness["I1"] == witness["I2"]
@@ -151,7 +140,7 @@ def test_about_an_axis_of_the_equator_of_a_symmetric_body_omega_drifts() -> None
 
 def test_first_of_all_the_motion_has_to_be_constant() -> None:
     for stable in (True, False):
-        report = audit(stable, ORDERED, AXES, ["I1", "I2", "I3"], ["w", "0", "0"], ["3/5", "0", "4/5"])
+        report = audit(stable, ORDERED, AXES, top("I1 I2 I3", "0 0 0", "0"), "w 0 0", "3/5 0 4/5")
         assert report.verdict == "refuted"
         assert {row.residual for row in report.rows if row.holds is False} == {"-4*w/5"}
         assert report.rows[-1].holds is None
@@ -167,11 +156,8 @@ def test_no_verdict_on_a_random_steady_motion_contradicts_its_eigenvalues(seed: 
     w, lever = Fraction(draw.randint(-4, 4), 2), Fraction(draw.randint(-90, 30), 4)
     moment = [(w**2 * i + lever) * g for i, g in zip(inertia, gamma, strict=True)]
     grows = growth(inertia, moment, [*(w * g for g in gamma), *gamma]) > 1e-8
-    texts = [[str(v) for v in part] for part in (inertia, [w * g for g in gamma], gamma, moment)]
-    stable, unstable = (
-        audit(claimed, [], {}, texts[0], texts[1], texts[2], weight="1", centre=texts[3]).verdict
-        for claimed in (True, False)
-    )
+    texts = [" ".join(map(str, part)) for part in (inertia, moment, [w * g for g in gamma], gamma)]
+    stable, unstable = (audit(claimed, [], {}, top(*texts[:2]), *texts[2:]).verdict for claimed in (True, False))
     assert (stable == "refuted", unstable == "holds") == (grows, grows)
     assert grows or (stable, unstable) in (("holds", "refuted"), ("undecided", "undecided"))
 
@@ -181,16 +167,12 @@ def test_no_verdict_on_a_random_steady_motion_contradicts_its_eigenvalues(seed: 
     [
         ({"stable": None}, "stable must be true or false"),
         ({"kind": "motion"}, "stable must be true or false"),
-        ({"motion": {"omega": ["t", "0", "0"], "gamma": list(UNITS[0])}}, "constant in time"),
+        ({"motion": {"omega": ["t", "0", "0"], "gamma": ["1", "0", "0"]}}, "constant in time"),
         ({"domain": "t>0"}, "about all times"),
-        (
-            {"system": "gyrostat", "top": {"inertia": list("321"), "weight": "0", "centre": list("000"), "rotor": "1"}},
-            "must be",
-        ),
-        ({"top": {"inertia": [*list("321"), "1/9", "0", "0"], "weight": "0", "centre": list("000")}}, "principal"),
+        ({"system": "gyrostat", "top": top("3 2 1", "0 0 0", "0", rotor="1")}, "must be"),
+        ({"top": top("3 2 1 1/9 0 0", "0 0 0", "0")}, "principal"),
     ],
 )
-def test_what_a_claim_of_stability_needs(more: dict[str, Any], said: str) -> None:
-    table = claim(True, [], {}, list("321"), list(UNITS[0]), list(UNITS[0])) | more
+def test_what_a_claim_of_stability_needs(more: Table, said: str) -> None:
     with pytest.raises(InputError, match=said):
-        audit_claim(claim_from_table({key: value for key, value in table.items() if value is not None}, "x"))
+        audited(claim(True, [], {}, top("3 2 1", "0 0 0", "0"), UNITS[0], UNITS[0]) | more)
