@@ -13,13 +13,11 @@ from heavytop.features.claims.algebra.combinations import nonnegative_combinatio
 from heavytop.features.claims.algebra.conditions import solve_relations
 from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.structure import Defined, at_values, rate_along
+from support.claim_algebra import A, B, C, P, Q, T, sign_of, vanishes
 from support.claim_tables import Table, audited, energy, integral, top, upright
 
 ENERGY = "(3*Omega1^2 + 2*Omega2^2 + Omega3^2)"
 """Of the top of Euler, twice."""
-T = sympy.Symbol("t", real=True)
-A, B, C = sympy.symbols("a b c", real=True)
-P, Q = sympy.symbols("p q", positive=True)
 
 
 @pytest.mark.slow
@@ -167,8 +165,7 @@ def test_two_relations_are_solved_one_after_the_other():
     ],
 )
 def test_nested_roots_are_sums_of_roots_with_the_right_signs(nested, simple, is_same):
-    field = Field(Assumptions(T, (P, Q)), [nested, simple])
-    assert field.vanishes(nested - simple) is is_same
+    assert vanishes(nested - simple) is is_same
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -308,17 +305,15 @@ def test_a_function_of_first_integrals_through_definitions_is_constant(extra, st
 # --- what is no reason ----------------------------------------------------------------------------------------------
 
 
-def _signs(assumptions: Assumptions, inside: list[sympy.Expr], *asked: sympy.Expr) -> list[int]:
-    field = Field(assumptions, [*inside, *asked])
-    return [field.tower.sign(field.enter(e)).value for e in asked]
+def _signs(inside: list[sympy.Expr], *asked: sympy.Expr, **known: tuple) -> list[int]:
+    return [sign_of(e, [*inside, *asked], **known).value for e in asked]
 
 
 def test_a_root_does_not_make_what_is_under_it_positive():
     logarithms = [sympy.log(B**2 + 2), sympy.log(B**2 + 1)]
-    assert _signs(Assumptions(T), [sympy.sqrt(A), *logarithms], A, A + 1) == [0, 0]
-    linked = Assumptions(T, facts=(sympy.sqrt(A) + A * B,))
-    assert _signs(linked, [], A, A + 1, A * B + 1) == [0, 0, 0]
-    assert _signs(Assumptions(T, weak=(A,)), [sympy.sqrt(A)], A, A + 1, A + sympy.sqrt(A)) == [1, 1, 1]
+    assert _signs([sympy.sqrt(A), *logarithms], A, A + 1) == [0, 0]
+    assert _signs([], A, A + 1, A * B + 1, facts=(sympy.sqrt(A) + A * B,)) == [0, 0, 0]
+    assert _signs([sympy.sqrt(A)], A, A + 1, A + sympy.sqrt(A), weak=(A,)) == [1, 1, 1]
 
 
 @pytest.mark.parametrize(("assumed", "expected"), [([], "undecided"), (["sqrt(a) > 1"], "holds")])
@@ -330,12 +325,7 @@ def test_an_assumption_makes_its_own_roots_real_and_a_formula_does_not(assumed, 
 def test_an_exponential_below_1_is_no_lower_bound_above_1():
     small = sympy.exp(-P)
     for known in ({"facts": (B - small,)}, {"greater": ((B, small),)}):
-        assert _signs(Assumptions(T, positive=(P,), **known), [small], B - 1, B * small - 1, B, small - 2) == [
-            0,
-            0,
-            1,
-            -1,
-        ]
+        assert _signs([small], B - 1, B * small - 1, B, small - 2, **known) == [0, 0, 1, -1]
 
 
 @pytest.mark.parametrize(

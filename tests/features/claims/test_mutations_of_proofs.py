@@ -13,20 +13,14 @@ from heavytop.features.claims.algebra.prover import Prover, Region
 from heavytop.features.claims.algebra.reader import assume
 from heavytop.features.claims.algebra.ring import used
 from heavytop.features.claims.algebra.signs import Sign
-from heavytop.features.claims.algebra.statement import ALL, Flow, Formulas, Setting, Statement
+from heavytop.features.claims.algebra.statement import Flow, Formulas, Setting
 from heavytop.features.claims.audit.context import STATE
+from support.claim_algebra import SYMBOLS, A, B, C, P, T, statement
 from support.claim_tables import energy
 
-T = sympy.Symbol("t", real=True)
-A, B, C = SYMBOLS = sympy.symbols("a b c", real=True)
-P = sympy.Symbol("p", positive=True)
 OMEGA1, OMEGA2 = STATE[:2]
 SPHERE = sum(x**2 for x in STATE[3:]) - 1
 RESTING = Flow(lambda e: sympy.Integer(0), frozenset(STATE), always=(SPHERE,))
-
-
-def statement(residual: sympy.Expr, flow: Flow | None = None, needs: frozenset[Need] = frozenset()) -> Statement:
-    return Statement("", 0, "", ALL, residual, "", Formulas((residual,), needs), flow)
 
 
 def holds(x: str, divisor: str = "1", **parts: object) -> bool:
@@ -69,7 +63,7 @@ def test_each_kind_of_need_is_kept_apart():
 )
 def test_what_the_flow_keeps_is_as_strict_as_the_need(kind, expected):
     kept = OMEGA1 - OMEGA2
-    said = statement(sympy.sqrt(kept), RESTING, frozenset({Need(kind, kept)}))
+    said = statement(sympy.sqrt(kept), RESTING, formulas=Formulas((sympy.sqrt(kept),), frozenset({Need(kind, kept)})))
     field = Prover([said], Setting(T)).field(said, 0)
     assert field.tower.sign(field.enter(kept)) == expected
 

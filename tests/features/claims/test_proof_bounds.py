@@ -18,17 +18,16 @@ from heavytop.features.claims.algebra.conditions import (
     written,
 )
 from heavytop.features.claims.algebra.fields import Assumptions, Field, Regularity
-from heavytop.features.claims.algebra.prover import Prover, Region
+from heavytop.features.claims.algebra.prover import Prover
 from heavytop.features.claims.algebra.reader import FUNCTIONS
 from heavytop.features.claims.algebra.ring import used
 from heavytop.features.claims.algebra.signs import Sign
-from heavytop.features.claims.algebra.statement import AFTER, ALL, BEFORE, Domain, Flow, Formulas, Setting, Statement
+from heavytop.features.claims.algebra.statement import AFTER, ALL, BEFORE, Domain, Flow, Formulas, Statement
 from heavytop.features.claims.algebra.structure import sign_of as sign_by_structure
 from heavytop.features.claims.audit.judge import judge
+from support.claim_algebra import A, P, T, region_of, setting, sign_of, statement
 from support.claim_tables import audited, integral, top
 
-T, A = sympy.Symbol("t", real=True), sympy.Symbol("a", real=True)
-P = sympy.Symbol("p", positive=True)
 TINY = Fraction(1, 10**200)
 
 
@@ -147,11 +146,6 @@ def test_0_is_proven_and_what_is_off_by_1e_200_is_off(expression, value, expecte
 # --- signs and continuity ---------------------------------------------------------------------------------------------
 
 
-def sign_of(expression: sympy.Expr, sign: int = 0, strict: bool = False, **known) -> Sign:
-    field = Field(Assumptions(T, (P,), variable_sign=sign, strict=strict, **known), [expression])
-    return field.tower.sign(field.enter(expression))
-
-
 SIN, COS, ROOT = sympy.sin(T), sympy.cos(T), sympy.sqrt(1 + T**2)
 
 
@@ -200,7 +194,7 @@ SIN, COS, ROOT = sympy.sin(T), sympy.cos(T), sympy.sqrt(1 + T**2)
     ],
 )
 def test_a_sign_is_what_it_is_or_unknown_and_strict_only_where_it_is_never_0(expression, sign, expected) -> None:
-    value, strict = sign_of(expression, sign)
+    value, strict = sign_of(expression, variable_sign=sign)
     assert value in (expected[0], 0)
     assert strict <= expected[1]
     if expected[1]:
@@ -258,8 +252,7 @@ HALVES = sympy.tanh(T) * sympy.sqrt(T**2) - T * sympy.sqrt(sympy.tanh(T) ** 2)
 
 
 def verdict(residual: sympy.Expr, domain: Domain = ALL, flow: Flow | None = None) -> bool | None:
-    setting = Setting(T, (P,), samples=({P: Fraction(2), A: Fraction(1, 3)},))
-    (row,) = judge([Statement("1", 1, "smooth", domain, residual, "", flow=flow)], setting)
+    (row,) = judge([statement(residual, flow, domain, Formulas())], setting())
     return row.holds
 
 
@@ -280,14 +273,9 @@ def test_a_note_makes_another_domain() -> None:
     """Two domains of one label: what is known on the first says nothing on the second."""
     known = Domain("all", 0, ALL.points, "a > 0", facts=(A,))
     residual = sympy.sqrt(A**2) - A
-    setting = Setting(T, (P,), samples=({P: Fraction(2), A: Fraction(1, 3)},))
-    rows = judge([Statement("1", i, "smooth", d, residual, "") for i, d in enumerate((known, ALL))], setting)
-    assert [row.holds for row in rows] == [True, None]
-    assert [row.holds for row in reversed(judge([*_both(known, residual)], setting))] == [True, None]
-
-
-def _both(known: Domain, residual: sympy.Expr) -> list[Statement]:
-    return [Statement("1", i, "smooth", d, residual, "") for i, d in enumerate((ALL, known))]
+    for domains, expected in (((known, ALL), [True, None]), ((ALL, known), [None, True])):
+        stated = [Statement("1", i, "smooth", domain, residual, "") for i, domain in enumerate(domains)]
+        assert [row.holds for row in judge(stated, setting())] == expected
 
 
 @pytest.mark.parametrize(
@@ -310,21 +298,16 @@ def test_where_a_derivative_may_have_a_kink_nothing_is_refuted() -> None:
 
 
 def test_a_kink_is_no_place_where_a_residual_is_defined() -> None:
-    setting = Setting(T, (P,), samples=({P: Fraction(2)},))
-    kink = Statement("1", 1, "smooth", ALL, sympy.sign(sympy.sqrt(T + 1) - sympy.sqrt(2)) + T, "")
-    prover = Prover([kink], setting)
+    kink = statement(sympy.sign(sympy.sqrt(T + 1) - sympy.sqrt(2)) + T, formulas=Formulas())
+    prover, times = Prover([kink], setting()), (0, 1, 1 + Fraction(1, 10**100), 2)
     # at 1 the difference of roots is 0, and only to a ball: nobody knows
-    assert [prover.is_defined(kink, {T: Fraction(t), P: Fraction(2)}) for t in (0, 1, 1 + Fraction(1, 10**100), 2)] == [
-        *(True, False, True, True)
-    ]
+    defined = [prover.is_defined(kink, {T: Fraction(t), P: Fraction(2)}) for t in times]
+    assert defined == [True, False, True, True]
 
 
 def test_what_fails_on_the_relations_is_not_removable() -> None:
-    statement = Statement("1", 1, "smooth", ALL, T, "")
     for relations, expected in (((), True), ((A - 1,), False)):
-        setting = Setting(T, (P,), samples=({P: Fraction(2), A: Fraction(1)},), relations=relations)
-        field = Field(setting.assumptions(0), [A - 1])
-        region = Region(field, setting, statement, list(setting.sample_points(statement)))
+        region = region_of(A - 1, setting(1, relations=relations))
         assert region.is_removable(Need(ConditionKind.NONZERO, A - 1)) is expected
 
 
@@ -337,10 +320,8 @@ def test_what_is_off_by_less_than_a_short_ball_shows_is_refuted_all_the_same() -
     [Need(ConditionKind.NONNEGATIVE, -1 - T**2), Need(ConditionKind.NONZERO, T - T), Need(ConditionKind.POSITIVE, -P)],
 )
 def test_a_place_where_a_formula_is_undefined_is_no_witness(need: Need) -> None:
-    setting = Setting(T, (P,), samples=({P: Fraction(2)},))
     for needs, holds in ((frozenset({need}), None), (frozenset(), False)):
-        formulas = Formulas(values=(T,), needs=needs)
-        (row,) = judge([Statement("1", 1, "smooth", ALL, 1 + T**2, "", formulas)], setting)
+        (row,) = judge([statement(1 + T**2, formulas=Formulas(values=(T,), needs=needs))], setting())
         assert row.holds is holds
         assert [c.discharged for c in row.conditions if c.text == written(need.text)] == [False] * len(needs)
 
@@ -348,57 +329,48 @@ def test_a_place_where_a_formula_is_undefined_is_no_witness(need: Need) -> None:
 # --- what is 0 on no open set, and what is 0 nowhere ------------------------------------------------------------------
 
 
-def region(expression: sympy.Expr, flow: Flow | None = None, **known) -> tuple[Region, object]:
-    """The region of a claim with its sample at a = -2, and the numerator of the expression there."""
-    setting = Setting(T, (P,), samples=({P: Fraction(2), A: Fraction(-2)},), **known)
-    statement = Statement("1", 1, "smooth", ALL, T, "", flow=flow)
-    field = Field(setting.assumptions(0), [expression])
-    return Region(field, setting, statement, list(setting.sample_points(statement))), field.enter(expression).numerator
-
-
 @pytest.mark.parametrize("known", [{"facts": (A**2 - 1,)}, {"nonzero": (A,)}, {"facts": (A**2 - 1, -A)}])
 def test_a_function_that_is_not_0_at_a_sample_may_be_0_on_another_part_of_a_domain_in_parts(known: dict) -> None:
     """|a| - a is 0 where a > 0."""
-    where, p = region(sympy.sqrt(A**2) - A, **known)
-    assert where.is_zero_nowhere_dense(p) is (-A in known.get("facts", ()))
+    e = sympy.sqrt(A**2) - A
+    where = region_of(e, setting(-2, **known))
+    assert where.is_zero_nowhere_dense(where.field.enter(e).numerator) is (-A in known.get("facts", ()))
 
 
 def test_a_condition_of_degree_2_may_part_a_domain() -> None:
     """Where a b > 1, atan a + atan b is atan((a + b)/(1 - a b)), and pi more where a > 0, pi less where a < 0."""
     b = sympy.Symbol("b", real=True)
     expression = sympy.atan(A) + sympy.atan(b) - sympy.atan((A + b) / (1 - A * b)) - sympy.pi
-    setting = Setting(T, (), samples=({A: Fraction(-2), b: Fraction(-2)},), facts=(A * b - 1,))
-    field = Field(setting.assumptions(0), [expression])
-    statement = Statement("1", 1, "smooth", ALL, T, "")
-    where = Region(field, setting, statement, list(setting.sample_points(statement)))
-    p = field.enter(expression).numerator
+    at = ({P: Fraction(2), A: Fraction(-2), b: Fraction(-2)},)
+    where = region_of(expression, setting(samples=at, facts=(A * b - 1,)))
+    p = where.field.enter(expression).numerator
     assert not where.regularity.obstacle_of_generators(used(p), analytic=True)
     assert not where.is_zero_nowhere_dense(p)
 
 
+GUDERMANNIAN = sympy.asin(sympy.tanh(A)) - 2 * sympy.atan(sympy.tanh(A / 2))
+"""0, which the algebra does not know."""
+
+
 def test_an_identity_that_the_algebra_does_not_know_may_be_0_all_over() -> None:
-    gudermannian = sympy.asin(sympy.tanh(A)) - 2 * sympy.atan(sympy.tanh(A / 2))
-    for expression, expected in ((gudermannian, False), (gudermannian + 1, True)):
-        where, p = region(expression)
-        assert where.is_zero_nowhere_dense(p) is expected
+    for e, expected in ((GUDERMANNIAN, False), (GUDERMANNIAN + 1, True)):
+        where = region_of(e, setting(-2))
+        assert where.is_zero_nowhere_dense(where.field.enter(e).numerator) is expected
 
 
 @pytest.mark.slow
 def test_what_is_said_of_an_undecided_residual_holds_all_balls(monkeypatch) -> None:
-    setting = Setting(T, (P,), samples=({P: Fraction(2), A: Fraction(-2)},))
-    gudermannian = sympy.asin(sympy.tanh(A)) - 2 * sympy.atan(sympy.tanh(A / 2))
-    statement = Statement("1", 1, "smooth", ALL, sympy.exp(gudermannian) - 1, "")
     for ball in (arb(0.5, 0.75), arb(-0.5, 0.75), arb(0, 1.25)):
         monkeypatch.setattr("heavytop.features.claims.audit.judge.evaluate", lambda *_, ball=ball: ball)
-        (row,) = judge([statement], setting)
+        (row,) = judge([statement(sympy.exp(GUDERMANNIAN) - 1, formulas=Formulas())], setting(-2))
         assert 1.25 <= float(row.residual.removeprefix("|residual| < ").removesuffix(" at the sample points")) < 1.27
 
 
 @pytest.mark.parametrize(("rate", "kept"), [(A, True), (A**2, True), (sympy.Integer(1), False), (A / (A - P), False)])
 def test_what_the_flow_does_not_keep_may_become_0(rate: sympy.Expr, kept: bool) -> None:
     flow = Flow(lambda e: sympy.diff(e, A) * rate, frozenset({A}))
-    where, p = region(A, flow)
-    assert where.is_nowhere_zero(p) is kept
+    where = region_of(A, setting(-2), flow)
+    assert where.is_nowhere_zero(where.field.enter(A).numerator) is kept
 
 
 def test_a_half_alone_proves_nothing_of_the_whole() -> None:
@@ -408,11 +380,11 @@ def test_a_half_alone_proves_nothing_of_the_whole() -> None:
 
 def test_both_halves_are_asked_what_they_divide_by() -> None:
     """For one sign of t the divisor is |t|; for the other it is |t| (|a| - a), 0 for all a > 0."""
-    size, setting = sympy.sqrt(T**2), Setting(T, (P,), samples=({P: Fraction(2), A: Fraction(-2)},))
+    size = sympy.sqrt(T**2)
     for sign in (1, -1):
         divisor = (size - sign * T) / 2 + (size + sign * T) / 2 * (sympy.sqrt(A**2) - A)
         residual = sympy.Mul(HALVES, 1 / divisor, evaluate=False)
-        (row,) = judge([Statement("1", 1, "smooth", ALL, residual, "", Formulas(values=(T,)))], setting)
+        (row,) = judge([statement(residual, formulas=Formulas(values=(T,)))], setting(-2))
         assert row.holds is None
         assert {c.discharged for c in row.conditions if c.text.startswith("the algebra divides")} == {False}
 
@@ -421,8 +393,7 @@ def test_both_halves_are_asked_what_they_divide_by() -> None:
 def test_a_power_of_a_rate_in_the_ideal_keeps_no_relation(is_relation: bool, holds: bool | None) -> None:
     """a² = 0 forces a = 0 at each point, which does not make a double zero one that stays."""
     flow = Flow(lambda e: sympy.Integer(0), frozenset({A}), is_relation=is_relation)
-    setting = Setting(T, (P,), samples=({P: Fraction(2), A: Fraction(0)},), relations=(A**2,))
-    (row,) = judge([Statement("1", 1, "smooth", ALL, A, "", Formulas(values=(A,)), flow)], setting)
+    (row,) = judge([statement(A, flow)], setting(0, relations=(A**2,)))
     assert row.holds is holds
 
 
@@ -463,9 +434,8 @@ def test_simpler_conditions_hold_at_the_same_points(expression: sympy.Expr, zero
 def test_a_place_is_one_only_where_the_relations_are_proven_to_be_0() -> None:
     for extra, expected in ((0, 1), (Fraction(1, 10**200), 0)):
         relation = sympy.log(A * 6) - sympy.log(2) - sympy.log(3) + sympy.Rational(str(extra))
-        setting = Setting(T, (P,), samples=({A: Fraction(1)},), relations=(relation,))
-        domain = Domain("all", 0, (Fraction(0),))
-        assert len(list(setting.sample_points(Statement("1", 1, "smooth", domain, T, "")))) == expected
+        at_0 = statement(T, domain=Domain("all", 0, (Fraction(0),)))
+        assert len(list(setting(1, relations=(relation,)).sample_points(at_0))) == expected
 
 
 @pytest.mark.parametrize(("bound", "verdict"), [("a > -1", "undecided"), ("a > 0", "holds")])

@@ -10,19 +10,11 @@ from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.prover import Region
 from heavytop.features.claims.algebra.ring import used
 from heavytop.features.claims.algebra.signs import Sign
-from heavytop.features.claims.algebra.statement import ALL, Flow, Setting, Statement
+from heavytop.features.claims.algebra.statement import Flow, Setting
 from heavytop.features.claims.audit.context import STATE
+from support.claim_algebra import SYMBOLS, A, B, C, D, E, P, T, sign_of, statement
 
-T = sympy.Symbol("t", real=True)
-A, B, C, D, E = SYMBOLS = sympy.symbols("a b c d e", real=True)
-P = sympy.Symbol("p", positive=True)
 UNKNOWN, NONNEGATIVE, POSITIVE = Sign(0, False), Sign(1, False), Sign(1, True)
-
-
-def sign(e: sympy.Expr, facts: tuple[sympy.Expr, ...] = (), weak: tuple[sympy.Expr, ...] = ()) -> Sign:
-    """The sign of ``e`` where the facts are > 0 and the weak facts are >= 0."""
-    field = Field(Assumptions(T, facts=facts, weak=weak, positive=(P,)), [e])
-    return field.tower.sign(field.enter(e))
 
 
 @pytest.mark.slow
@@ -47,7 +39,7 @@ def sign(e: sympy.Expr, facts: tuple[sympy.Expr, ...] = (), weak: tuple[sympy.Ex
     ],
 )
 def test_a_sign_is_as_strict_as_what_it_follows_from(e, facts, weak, expected):
-    assert sign(sympy.expand(e), facts, weak) == expected
+    assert sign_of(sympy.expand(e), facts=facts, weak=weak) == expected
 
 
 @pytest.mark.parametrize(("facts", "weak", "expected"), [((A,), (), True), ((), (A,), False), ((), (), False)])
@@ -115,5 +107,5 @@ def test_the_unit_sphere_is_connected_where_nothing_cuts_it(facts, weak, relatio
     known = Assumptions(T, facts=facts, weak=weak, relations=(*relations, sphere))
     field = Field(known, STATE)
     flow = Flow(lambda e: sympy.Integer(0), frozenset(STATE), always=(sphere,))
-    region = Region(field, Setting(T), Statement("", 0, "", ALL, STATE[3], "", flow=flow), [])
+    region = Region(field, Setting(T), statement(STATE[3], flow), [])
     assert region.is_connected(used(field.enter(STATE[3] + STATE[4]).numerator)) is connected
