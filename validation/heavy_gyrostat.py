@@ -1,4 +1,4 @@
-"""Random heavy gyrostats against a Taylor series of (M, γ, ξ) in mpmath that knows nothing of this program.
+"""Random heavy gyrostats against a Taylor series of (Ω, γ, ξ) in mpmath that knows nothing of this program.
 
     python validation/heavy_gyrostat.py [MOTIONS] [DIGITS]
 
@@ -14,9 +14,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import heavytop as ht
 from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.precision import exact
 from heavytop.top.attitude import perpendicular
-from integrate.test_heavy_gyrostat import _exactly, _fraction, independent
+from support.full_tensor import integrate_top
 from support.helpers import fraction, positive, unit_vector, vector
 
 
@@ -30,19 +31,19 @@ def main(motions: int = 20, digits: int = 50) -> None:
         rate = max(*map(abs, start.omega), max(map(abs, top.rotor or ())) / min(top.inertia))
         time = random.choice([1, -1]) * (1 + abs(fraction(random))) / (10 * rate)
         xi = [exact(value) for value in perpendicular([float(g) for g in start.gamma])]
-        known = [_exactly(value) for value in independent(top, start, time, xi, digits)]
+        known = integrate_top(top, start, time, xi, digits)
         exactly = Validated(top, start, ht.HEAVY_GYROSTAT, xi=tuple(xi))
         bits = int(3.33 * digits)
         balls = [*exactly.state(time, bits), *exactly.attitude(time, bits)]
-        near = [(abs(_fraction(b.mid()) - v), _fraction(b.rad())) for b, v in zip(balls, known, strict=True)]
+        near = [(abs(midpoint(b) - v), radius(b)) for b, v in zip(balls, known, strict=True)]
         scale = max(map(abs, known))
-        assert all(off <= radius + scale * Fraction(1, 10**digits) for off, radius in near), (top, start, time)
+        assert all(off <= reach + scale * Fraction(1, 10**digits) for off, reach in near), (top, start, time)
         line = [f"{float(max(off for off, _ in near) / scale):.1e}"]
         for name in ("words", "heyoka"):
             run = ht.propagate(top, start, [time], integrator=name)
             given = Validated(run.problem.top, run.problem.start, ht.HEAVY_GYROSTAT).state(exact(run.times[0]), 100)
             pairs = zip(run.states[0], given, strict=True)
-            line.append(f"{name} {float(max(abs(exact(a) - _fraction(b.mid())) for a, b in pairs) / scale):.1e}")
+            line.append(f"{name} {float(max(abs(exact(a) - midpoint(b)) for a, b in pairs) / scale):.1e}")
         print(f"{number}: |k| {float(max(map(abs, top.rotor or ()))):.2g}, t {float(time):.3g}: ", *line, flush=True)
 
 

@@ -93,14 +93,6 @@ def later(top, start, times, precision, *, system, tolerance=None):
 
 
 # the coarse run's seconds with the fine run's states
-def one_time_coarse(top, start, times, precision, *, system, tolerance=None):
-    return run(top, start, times, precision, system, COARSE if len(times) == 1 else FINE)
-
-
-def many_times_coarse(top, start, times, precision, *, system, tolerance=None):
-    return run(top, start, times, precision, system, FINE if len(times) == 1 else COARSE)
-
-
 counts = {}
 
 
@@ -109,43 +101,39 @@ def counted(name):
     return counts[name]
 
 
-def every_other_coarse(top, start, times, precision, *, system, tolerance=None):
-    return run(top, start, times, precision, system, COARSE if counted("other") % 2 else FINE)
+def coarse(where):
+    def peer(top, start, times, precision, *, system, tolerance=None):
+        return run(top, start, times, precision, system, COARSE if where(start, times) else FINE)
+    return peer
 
 
-def first_fine(top, start, times, precision, *, system, tolerance=None):
-    return run(top, start, times, precision, system, FINE if counted("first") < 4 else COARSE)
-
-
-def known_start_fine(top, start, times, precision, *, system, tolerance=None):
-    simple = start.omega[0].denominator < 1000
-    return run(top, start, times, precision, system, FINE if simple else COARSE)
+one_time_coarse = coarse(lambda start, times: len(times) == 1)
+many_times_coarse = coarse(lambda start, times: len(times) > 1)
+every_other_coarse = coarse(lambda *_: counted("other") % 2)
+first_fine = coarse(lambda *_: counted("first") >= 4)
+known_start_fine = coarse(lambda start, times: start.omega[0].denominator >= 1000)
 
 
 # from memory
-seen = {}
+def remembering(key_of):
+    seen = {}
+
+    def peer(top, start, times, precision, *, system, tolerance=None):
+        key = key_of(start), tuple(times)
+        if key not in seen:
+            sleep(0.01)
+            seen[key] = run(top, start, times, precision, system)
+        return seen[key]
+    return peer
 
 
-def memory(top, start, times, precision, *, system, tolerance=None):
-    key = top, start, tuple(times)
-    if key not in seen:
-        sleep(0.01)
-        seen[key] = run(top, start, times, precision, system)
-    return seen[key]
-
-
-def rough_memory(top, start, times, precision, *, system, tolerance=None):
-    key = tuple(round(float(value), 9) for value in start.flat), tuple(times)
-    if key not in seen:
-        sleep(0.01)
-        seen[key] = run(top, start, times, precision, system)
-    return seen[key]
+memory = remembering(lambda start: start)
+rough_memory = remembering(lambda start: tuple(round(float(value), 9) for value in start.flat))
 
 
 # two equal calls
-def random(top, start, times, precision, *, system, tolerance=None):
-    found = run(top, start, times, precision, system)
-    return replace(found, states=found.states * (1 + 1e-15 * numpy.frombuffer(os.urandom(6), "u1")))
+random = changed(states=lambda found: found.states * (1 + 1e-15 * numpy.frombuffer(os.urandom(6), "u1")))
+other_steps = changed(steps=lambda found: found.steps + counted("steps"))
 
 
 def random_samples(top, start, times, precision, *, system, tolerance=None):
@@ -158,14 +146,6 @@ def last_bit(top, start, times, precision, *, system, tolerance=None):
     if counted("bit") % 2:
         states[0, 4] = numpy.nextafter(states[0, 4], 9)
     return replace(found, states=states)
-
-
-def other_steps(top, start, times, precision, *, system, tolerance=None):
-    found = run(top, start, times, precision, system)
-    return replace(found, steps=found.steps + counted("steps"))
-
-
-gives_up = 0
 
 
 def sometimes(top, start, times, precision, *, system, tolerance=None):
@@ -218,8 +198,7 @@ class Two(Trajectory):
         return found
 
 
-def somebody(top, start, times, precision, *, system, tolerance=None):
-    return replace(run(top, start, times, precision, system), integrator="heyoka")
+somebody = changed(integrator=lambda found: "heyoka")
 '''
 CHEATS = {
     "one_time_coarse": "asked for its last time alone, ended ",

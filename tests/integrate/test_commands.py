@@ -28,6 +28,7 @@ from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, real
 from heavytop.top.equations import GYROSTAT
 from heavytop.written_numbers import number as written
+from support.helpers import judged
 
 PROGRAM = Path(__file__).parents[1] / "support" / "faulty_program.py"
 CASE = CASES["generic"]
@@ -143,11 +144,6 @@ def test_what_no_row_can_see_the_check_of_the_contract_names(fault: str, monkeyp
     part, text = DIAGNOSED[fault]
     found = judged(program(fault), part)
     assert (found.verdict, text in found.text) == ("violated", True)
-
-
-def judged(which: Command, part: str) -> integrator_check.Checked:
-    """One part of the contract alone."""
-    return integrator_check._judged(part, dict(integrator_check._Contract(which).parts())[part])
 
 
 @pytest.mark.slow

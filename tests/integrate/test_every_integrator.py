@@ -179,11 +179,8 @@ def what_is_not_finite_is_no_success(name: str) -> None:
     wild = State([size] * 3, GENERIC.start.gamma)
     if name == "mpmath:odefun":
         return  # its exponents have no end and its first step one length for all rates: it would not return
-    if name in (
-        "multiword",
-        "heyoka",
-        "planted fault",
-    ):  # scale the time: nothing overflows, and time 1 would take 1e200 steps
+    if name in ("multiword", "heyoka", "planted fault"):
+        # these scale the time: nothing overflows, and time 1 would take 1e200 steps
         run = call(name, GENERIC.top, wild, [1 / size])
         ends_well(run, [exact(number(1 / size, DOUBLE))])
         assert np.isfinite(run.states).all()
@@ -320,8 +317,8 @@ def test_every_peer_and_heyoka_agree_to_the_tolerance(name: str, case: str) -> N
     need(name)
     given = CASES[case]
     ours = propagate(given.top, given.start, TIMES, DOUBLE, system=given.system)
-    many = run_peer(name, given.top, given.start, TIMES, DOUBLE, system=given.system, setting=setting_of(name))
-    alone = run_peer(name, given.top, given.start, TIMES[-1:], DOUBLE, system=given.system, setting=setting_of(name))
+    options = {"system": given.system, "setting": setting_of(name)}
+    many, alone = (run_peer(name, given.top, given.start, times, DOUBLE, **options) for times in (TIMES, TIMES[-1:]))
     assert many.outcome is alone.outcome is Outcome.SUCCESS
     assert many.integrator == name
     assert distance(many, ours) < (F(1, 10**7) if name == "scipy:Radau" else F(1, 10**9))
@@ -360,21 +357,9 @@ def test_the_compiled_field_of_nine_numbers_turns_xi_as_the_body_turns() -> None
 def test_half_the_step_of_a_splitting_has_its_order(order: int, step: int, name: str) -> None:
     case = CASES[name]
     ours = propagate(case.top, case.start, [F(8)], DOUBLE, system=case.system)
-    errors = [
-        distance(
-            run_peer(
-                f"splitting:{order}",
-                case.top,
-                case.start,
-                [F(8)],
-                system=case.system,
-                setting=("step", F(1, step * n)),
-            ),
-            ours,
-        )
-        for n in (1, 2)
-    ]
-    assert 0.8 * 2**order < errors[0] / errors[1] < 1.6 * 2**order
+    given = f"splitting:{order}", case.top, case.start, [F(8)]
+    runs = [run_peer(*given, system=case.system, setting=("step", F(1, step * n))) for n in (1, 2)]
+    assert 0.8 * 2**order < distance(runs[0], ours) / distance(runs[1], ours) < 1.6 * 2**order
 
 
 @pytest.mark.slow

@@ -25,6 +25,7 @@ from heavytop.multiword.fixed_point import fixed_point_run, steps
 from heavytop.multiword.fixed_point.fixed_point_run import Fixed
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, parse
 from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
+from support.helpers import distance
 
 CASE = CASES["kovalevskaya"]
 INTEGRATORS = {"heyoka": propagate, "multiword": propagate_multiword}
@@ -40,21 +41,22 @@ def regular(count: int, last: int) -> list[Fraction]:
     return [Fraction(last * k, count) for k in range(count + 1)]
 
 
-def one_by_one(integrate, times, precision, case=CASE, **options) -> tuple[Trajectory, list, list]:
-    """The run whose states are observed, which takes one sample after the other."""
+def run_of(name: str, times, precision=DOUBLE, case=CASE, **options) -> Trajectory:
+    return INTEGRATORS[name](case.top, case.start, times, precision, system=case.system, **options)
+
+
+def assert_as_one_by_one(name: str, given, precision=DOUBLE, case=CASE, many=None, **options) -> Trajectory:
+    """The run has the bits of one whose states are observed, which takes one sample after the other."""
     seen: list = []
-    run = integrate(case.top, case.start, times, precision, system=case.system,
-                    observer=lambda time, state: seen.append((time, state)), **options)  # fmt: skip
-    return run, [time for time, _ in seen], [state for _, state in seen]
-
-
-def require_same(many: Trajectory, single: tuple[Trajectory, list, list]) -> None:
-    run, times, states = single
+    run = run_of(name, given, precision, case, observer=lambda *sample: seen.append(sample), **options)
+    times, states = [time for time, _ in seen], [state for _, state in seen]
+    many = many or run_of(name, given, precision, case, **options)
     assert tuple(many.times) == tuple(times)
     assert (many.outcome, many.steps, many.time_reached, many.order) == (
         run.outcome, run.steps, run.time_reached, run.order)  # fmt: skip
     assert len(many.states) == len(states)
     assert all((a == b).all() for a, b in zip(many.states, states, strict=True))
+    return many
 
 
 @pytest.mark.slow
@@ -75,24 +77,18 @@ def require_same(many: Trajectory, single: tuple[Trajectory, list, list]) -> Non
     ids=lambda value: getattr(value, "name", value),
 )
 def test_many_states_have_the_bits_of_single_ones(name, precision, part, times, sign) -> None:
-    asked = [sign * time / part for time in times[: len(times) if part == 1 else 300]]
-    require_same(
-        INTEGRATORS[name](CASE.top, CASE.start, asked, precision), one_by_one(INTEGRATORS[name], asked, precision)
-    )
+    assert_as_one_by_one(name, [sign * time / part for time in times[: len(times) if part == 1 else 300]], precision)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("precision", "sign"), [(QUAD, 1), (parse("real:150"), -1)])
 def test_times_that_are_doubles_take_arrays_on_a_grid_too(precision, sign: int) -> None:
-    times = [sign * float(time) / 20 for time in irregular(200, 60, 3)]
-    require_same(
-        propagate_multiword(CASE.top, CASE.start, times, precision), one_by_one(propagate_multiword, times, precision)
-    )
+    assert_as_one_by_one("multiword", [sign * float(time) / 20 for time in irregular(200, 60, 3)], precision)
 
 
 def test_samples_whose_sums_leave_their_range_are_taken_by_series(monkeypatch: pytest.MonkeyPatch) -> None:
     times = [float(time) / 20 for time in irregular(100, 60, 5)]
-    usual = propagate_multiword(CASE.top, CASE.start, times, QUAD)
+    usual = run_of("multiword", times, QUAD)
     for module in (steps, fixed_point_run):
         monkeypatch.setattr(module, "most_of", lambda _: 1.0)  # what sums of this motion now and then exceed
     monkeypatch.setattr(fixed_point_run, "machine", lru_cache(steps.build))
@@ -101,81 +97,71 @@ def test_samples_whose_sums_leave_their_range_are_taken_by_series(monkeypatch: p
     monkeypatch.setattr(
         Fixed, "_moved", lambda run, words, span, left: moved.append(span) or move(run, words, span, left)
     )
-    found = propagate_multiword(CASE.top, CASE.start, times, QUAD)
+    found = run_of("multiword", times, QUAD)
     assert 0 < len(moved) < len(times)
-    require_same(found, one_by_one(propagate_multiword, times, QUAD))
-    assert all(
-        abs(exact(a) - exact(b)) <= 4 * QUAD.eps for a, b in zip(found.states.flat, usual.states.flat, strict=True)
-    )
+    assert_as_one_by_one("multiword", times, QUAD, many=found)
+    assert distance(found, usual) <= 4 * QUAD.eps
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", INTEGRATORS)
 @pytest.mark.parametrize("case", ["lagrange", "ershkov-partial-6", "hess-pendulum"])
 def test_other_tops_and_systems_too(name: str, case: str) -> None:
-    given, times = CASES[case], irregular(400, 20, 2)
-    many = INTEGRATORS[name](given.top, given.start, times, DOUBLE, system=given.system)
-    require_same(many, one_by_one(INTEGRATORS[name], times, DOUBLE, given))
+    assert_as_one_by_one(name, irregular(400, 20, 2), case=CASES[case])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", INTEGRATORS)
 def test_dense_times_within_the_first_steps(name: str) -> None:
-    times = [Fraction(k, 3000) for k in range(1, 3001)]
-    require_same(INTEGRATORS[name](CASE.top, CASE.start, times, DOUBLE), one_by_one(INTEGRATORS[name], times, DOUBLE))
+    assert_as_one_by_one(name, [Fraction(k, 3000) for k in range(1, 3001)])
 
 
 def test_a_time_where_a_step_ends_belongs_to_that_step() -> None:
     run, _ = first_steps(CASE.top, CASE.start, Fraction(40), DOUBLE)
     ends = {Fraction(float(time)) for time in run.times}
-    times = sorted({*ends, *regular(600, 40)[1:]})
-    require_same(propagate(CASE.top, CASE.start, times, DOUBLE), one_by_one(propagate, times, DOUBLE))
+    assert_as_one_by_one("heyoka", sorted({*ends, *regular(600, 40)[1:]}))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", INTEGRATORS)
 @pytest.mark.parametrize("limit", [1, 5, 90])
 def test_a_run_that_stops_early_gives_the_same_states(name: str, limit: int) -> None:
-    times = regular(1000, 50)
-    many = INTEGRATORS[name](CASE.top, CASE.start, times, DOUBLE, step_limit=limit)
-    assert many.outcome is Outcome.STEP_LIMIT
-    require_same(many, one_by_one(INTEGRATORS[name], times, DOUBLE, step_limit=limit))
+    assert assert_as_one_by_one(name, regular(1000, 50), step_limit=limit).outcome is Outcome.STEP_LIMIT
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", INTEGRATORS)
 def test_an_equilibrium_and_units_of_any_size(name: str) -> None:
     times = regular(500, 20)
-    rest = HeavyTop((2, 2, 1), 1, (0, 0, 1)), State((0, 0, 0), (0, 0, 1))
-    run = INTEGRATORS[name](*rest, times, DOUBLE)
-    assert (run.outcome, run.steps) == (Outcome.SUCCESS, one_by_one(INTEGRATORS[name], times, DOUBLE)[0].steps * 0)
+    rest = replace(CASE, top=HeavyTop((2, 2, 1), 1, (0, 0, 1)), start=State((0, 0, 0), (0, 0, 1)))
+    run = assert_as_one_by_one(name, times, case=rest)
+    assert (run.outcome, run.steps) == (Outcome.SUCCESS, 0)
     assert (run.states == [0, 0, 0, 0, 0, 1]).all()
     for size in (Fraction(10) ** 100, Fraction(10) ** -100):
         top = HeavyTop([i * size for i in CASE.top.inertia], CASE.top.weight / size, CASE.top.centre)
         start, late = State([w / size for w in CASE.start.omega], CASE.start.gamma), [time * size for time in times]
-        case = type(CASE)(CASE.name, CASE.about, CASE.system, top, start)
-        require_same(INTEGRATORS[name](top, start, late, DOUBLE), one_by_one(INTEGRATORS[name], late, DOUBLE, case))
+        assert_as_one_by_one(name, late, case=replace(CASE, top=top, start=start))
 
 
 def test_a_run_of_few_steps_between_many_times_is_one_call(monkeypatch: pytest.MonkeyPatch) -> None:
     taken = []
     monkeypatch.setattr(motions.Stepper, "sample", lambda *_: taken.append(1))
-    assert len(propagate(CASE.top, CASE.start, regular(1000, 50), DOUBLE).states) == 1001
+    assert len(run_of("heyoka", regular(1000, 50)).states) == 1001
     assert taken == []
 
 
 @pytest.mark.parametrize(("name", "most"), [("heyoka", 5), ("multiword", 8)])
 def test_a_sample_costs_few_calls_of_python(name: str, most: int) -> None:
     times = regular(2000, 100)
-    INTEGRATORS[name](CASE.top, CASE.start, times, DOUBLE)
+    run_of(name, times)
     profile = cProfile.Profile()
-    profile.runcall(INTEGRATORS[name], CASE.top, CASE.start, times, DOUBLE)
+    profile.runcall(run_of, name, times)
     assert pstats.Stats(profile).total_calls < most * len(times)
 
 
 def test_rounded_times_are_exact_when_asked_for() -> None:
     times = regular(300, 7)
-    run = propagate(CASE.top, CASE.start, times, DOUBLE)
+    run = run_of("heyoka", times)
     assert isinstance(run.times, RoundedTimes)
     expected = tuple(exact(number(time, DOUBLE)) for time in times)
     assert run.times == expected == tuple(run.times)
@@ -197,7 +183,7 @@ def test_the_first_and_last_rows_alone_are_formatted() -> None:
     assert "999990 more" in text
     calls = []
     for count in (30, 3000):
-        run = propagate(CASE.top, CASE.start, regular(count, 100), DOUBLE)
+        run = run_of("heyoka", regular(count, 100))
         profile = cProfile.Profile()
         profile.runcall(repr, run)
         calls.append(pstats.Stats(profile).total_calls)
@@ -256,16 +242,13 @@ def test_states_out_of_two_words_have_the_bits_of_exact_numbers(name: str, monke
 @pytest.mark.parametrize("name", ["double", "double-double"])
 def test_samples_of_one_call_end_anywhere(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(double_double_run, "_SAMPLES_AT_ONCE", 7)
-    precision, times = parse(name), irregular(50, 2, 7)
-    require_same(
-        propagate_multiword(CASE.top, CASE.start, times, precision), one_by_one(propagate_multiword, times, precision)
-    )
+    assert_as_one_by_one("multiword", irregular(50, 2, 7), parse(name))
 
 
 @pytest.mark.parametrize("name", ["double", "extended", "double-double", "quad", "real:70", "real:150"])
 def test_states_are_made_once_whoever_asks_for_them_first(name: str) -> None:
     def run() -> Trajectory:
-        return propagate_multiword(CASE.top, CASE.start, regular(80, 2), parse(name))
+        return run_of("multiword", regular(80, 2), parse(name))
 
     first, copied, replaced = run(), copy.copy(run()), replace(run(), integrator="another")
     assert first.states is first.states

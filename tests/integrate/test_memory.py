@@ -11,6 +11,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import msgspec
+import numpy as np
 import pytest
 
 from heavytop.cases import CASES
@@ -30,6 +31,7 @@ from heavytop.precision import DOUBLE
 from heavytop.records import Row, RowKey
 from heavytop.top.attitude import perpendicular
 from support import methods_with_memory as memory
+from support.helpers import judged
 
 pytestmark = pytest.mark.slow
 FOLDER = Path(__file__).parents[1] / "support"
@@ -65,9 +67,8 @@ def row(integrator, kind: str = "local_error", times=(Fraction(2),), options=Non
 @pytest.mark.parametrize("name", memory.HEALTHY)
 def test_the_order_of_a_method_with_a_memory_is_that_of_its_runs(name: str) -> None:
     place = list(memory.HEALTHY).index(name)
-    for declared, integrator in [*forms(name)][
-        place % 2 :: 2 - place % 2
-    ]:  # the declared program, or the declared peer
+    # the declared program, or the declared peer
+    for declared, integrator in [*forms(name)][place % 2 :: 2 - place % 2]:
         found = row(integrator)
         order = str(memory.METHODS[name][1])
         assert found.outcome == "success", found.reference.reason
@@ -91,9 +92,8 @@ def test_a_wrong_order_is_found_whatever_is_declared(name: str) -> None:
 @pytest.mark.parametrize("name", memory.HEALTHY)
 def test_the_contract_accuses_no_method_with_a_memory(name: str) -> None:
     for declared, integrator in forms(name):
-        contract = integrator_check._Contract(integrator)
         tried = "one time", "times [0]", "restart", "rest", "steps", "between steps"
-        parts = {part: integrator_check._judged(part, call) for part, call in contract.parts() if part in tried}
+        parts = {part: judged(integrator, part) for part in tried}
         assert {each.verdict for each in parts.values()} <= {"kept", "note"}
         begins_anew = not declared and name not in ("extrapolation",)
         assert parts["restart"].verdict == ("note" if begins_anew else "kept")
@@ -106,8 +106,7 @@ def test_a_restart_that_its_error_does_not_explain_is_violated() -> None:
         again = given.start[0] != float(CASES["generic"].start.omega[0])
         return replace(found, states=[[a + 1e-6 * again for a in y] for y in found.states])
 
-    contract = integrator_check._Contract(of_callable(double_peer("mine", 4, solve, "step", one_step=False)))
-    found = integrator_check._judged("restart", contract._restart)
+    found = judged(of_callable(double_peer("mine", 4, solve, "step", one_step=False)), "restart")
     assert (found.verdict, "times the error of the first" in found.text) == ("violated", True)
 
 
@@ -119,9 +118,9 @@ def test_what_draws_its_numbers_is_judged_within_its_error() -> None:
         drawn = [1e-6 * ((17 * i) % 7 - 3) for i in range(6)]
         return replace(found, states=[[a + b for a, b in zip(y, drawn, strict=True)] for y in found.states])
 
-    contract = integrator_check._Contract(of_callable(double_peer("drawn", 2, solve, "step", one_step=False)))
-    assert integrator_check._judged("restart", contract._restart).verdict == "kept"
-    rest = integrator_check._judged("rest", contract._rest)
+    drawing = of_callable(double_peer("drawn", 2, solve, "step", one_step=False))
+    assert judged(drawing, "restart").verdict == "kept"
+    rest = judged(drawing, "rest")
     assert (rest.verdict, "its error on a motion explains" in rest.text) == ("note", True)
 
 
@@ -185,69 +184,14 @@ def test_a_start_where_coordinates_are_singular_is_unsupported_and_the_check_tak
     case = CASES["pendulum"]
     with pytest.raises(Unsupported, match="coordinates are singular at this start"):
         registry.ready(down)(case.top, replace(case.start, gamma=(Fraction(0), Fraction(0), Fraction(1))), [1], DOUBLE)
-    contract = integrator_check._Contract(down)
-    assert contract.axis == (0, 1, 0)
-    assert integrator_check._judged("rest", contract._rest).verdict == "kept"
+    assert integrator_check._Contract(down).axis == (0, 1, 0)
+    assert judged(down, "rest").verdict == "kept"
     with pytest.raises(Exception, match="the zero vector"):
         registry.command_of({"name": "a", "command": ["b"], "singular_at": [[0, 0, 0]]}, Path(), "here")
 
 
-QUATERNION = """
-import sys
-from math import ceil
-sys.path.insert(0, {source!r})
-from heavytop.top.attitude import matrix_of_quaternion
-from heavytop.top.equations import HEAVY_TOP, Parameters
-
-given = {{}}
-for line in sys.stdin:
-    key, *words = line.split()
-    given[key] = words
-    if key == "heavytop-integrator":
-        print("ready quaternions 1", flush=True)
-    if key == "go":
-        inertia, moment, y, q = (list(map(float, given[part])) for part in ("inertia", "moment", "state", "quaternion"))
-        p, h, t = Parameters(inertia, moment, 0.0), float(given.get("setting", ["0.01"])[0]), 0.0
-        y = y[:3] + q
-
-        def field(y):
-            w, *v = y[3:]
-            a, b, c = y[:3]
-            rates = HEAVY_TOP.field(p, (*y[:3], *matrix_of_quaternion(y[3:])[2]))[:3]
-            turned = (-v[0]*a - v[1]*b - v[2]*c, w*a + v[1]*c - v[2]*b, w*b + v[2]*a - v[0]*c, w*c + v[0]*b - v[1]*a)
-            return [*rates, *(each / 2 for each in turned)]
-
-        for text in given["times"][1:]:
-            n = max(1, ceil(abs(float(text) - t) / h))
-            d = (float(text) - t) / n
-            for _ in range(n if float(text) != t else 0):
-                k1 = field(y)
-                k2 = field([a + d / 2 * b for a, b in zip(y, k1)])
-                k3 = field([a + d / 2 * b for a, b in zip(y, k2)])
-                k4 = field([a + d * b for a, b in zip(y, k3)])
-                y = [a + d / 6 * (e + 2*f + 2*g + i) for a, e, f, g, i in zip(y, k1, k2, k3, k4)]
-            t = float(text)
-            print("state", text, *map(repr, y))
-        print("done", flush=True)
-    if key == "quit":
-        break
-"""
-
-
-def test_a_program_and_a_peer_that_compute_with_a_quaternion(tmp_path: Path) -> None:
-    (tmp_path / "q.py").write_text(QUATERNION.format(source=str(Path(__file__).parents[2] / "src")))
-    line = (sys.executable, "-S", "-E", str(tmp_path / "q.py"))
-    mine = Command(name="q", command=line, setting="step", order=4, attitude="quaternion")
-
-    def solve(given):
-        found = list(memory.states(rk4, given.field, given.start.tolist(), given.times.tolist(), given.setting))
-        return Solved([y for y, _ in found], given.times[-1], found[-1][1])
-
-    def rk4(f, y, h):
-        while True:
-            y = memory.rk4(f, y, h)
-            yield y
-
+def test_a_program_and_a_peer_that_compute_with_a_quaternion() -> None:
+    mine, solve = program("classical", attitude="quaternion"), memory.solver(memory.METHODS["classical"][0])
     peer = of_callable(double_peer("q", 4, solve, "step", attitude="quaternion"))
     case = CASES["generic"]
     xi = tuple(map(Fraction, perpendicular(case.start.gamma)))
@@ -266,8 +210,7 @@ def test_a_start_may_be_off_by_the_rounding_of_its_representation_and_a_run_to_0
             raise ValueError("no time to go")
         return registry.ready("splitting:2")(top, start, times, precision, system=system)
 
-    contract = integrator_check._Contract(of_callable(refuses))
-    refused = integrator_check._judged("times [0]", contract._start_alone)
+    contract, refused = integrator_check._Contract(of_callable(refuses)), judged(of_callable(refuses), "times [0]")
     assert (refused.verdict, "as it may" in refused.text) == ("note", True)
     given = [float(value) for value in contract._problem().start.flat]
     assert contract._off_start(given) == ""
@@ -279,40 +222,23 @@ def test_a_start_may_be_off_by_the_rounding_of_its_representation_and_a_run_to_0
 # Steps, counts, and what lies between steps.
 
 
-def dopri(given, between, tiny=False):
-    """Of order 5, with a tolerance and an interpolant."""
-    import numpy
+def dopri(between):
+    """SciPy's method of order 5 with a tolerance, and an interpolant of one's own."""
+    from scipy.integrate import RK45
 
-    rows = [
-        [],
-        [1 / 5],
-        [3 / 40, 9 / 40],
-        [44 / 45, -56 / 15, 32 / 9],
-        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729],
-        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656],
-        [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
-    ]
-    errors = [71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40]
-    end = given.times[-1]
-    y, t, h = numpy.array(given.start), 0.0, numpy.copysign(0.01, end)
-    nodes, times, wanted = [(0.0, y)], [], given.times.tolist()
-    while t != end:
-        now = end - t if abs(end - t) <= abs(h) else h
-        k = []
-        for row_ in rows:
-            k.append(numpy.array(given.field((y + now * sum(a * b for a, b in zip(row_, k, strict=True))).tolist())))
-        wrong = abs(now * sum(a * b for a, b in zip(errors, k, strict=True))).max()
-        new = y + now * sum(a * b for a, b in zip(rows[6], k[:6], strict=True))
-        size = max(wrong / given.setting / (1 + abs(y).max()), 1e-8)
-        if size <= 1:
-            t = end if now == end - t else t + now
-            y = new
-            nodes.append((t, y))
-        h = now * min(5, max(0.2, 0.9 * size**-0.2))
-    for at in wanted:
-        n = next(i for i in range(1, len(nodes)) if abs(nodes[i][0]) >= abs(at))
-        times.append(between(given.field, *nodes[n - 1], *nodes[n], at))
-    return Solved(times, end, len(nodes) - 1)
+    def solve(given):
+        control = {"rtol": max(given.setting, 3e-14), "atol": given.setting}
+        solver = RK45(lambda _, y: np.array(given.field(y.tolist())), 0.0, given.start, given.times[-1], **control)
+        nodes, states = [(0.0, given.start)], []
+        while solver.status == "running":
+            solver.step()
+            nodes.append((solver.t, solver.y))
+        for at in given.times.tolist():
+            n = next(i for i in range(1, len(nodes)) if abs(nodes[i][0]) >= abs(at))
+            states.append(between(given.field, *nodes[n - 1], *nodes[n], at))
+        return Solved(states, given.times[-1], len(nodes) - 1)
+
+    return solve
 
 
 def linear(field, t0, y0, t1, y1, at):
@@ -321,10 +247,8 @@ def linear(field, t0, y0, t1, y1, at):
 
 
 def cubic(field, t0, y0, t1, y1, at):
-    import numpy
-
     h, s = t1 - t0, (at - t0) / (t1 - t0)
-    f0, f1 = (numpy.array(field(y.tolist())) for y in (y0, y1))
+    f0, f1 = (np.array(field(y.tolist())) for y in (y0, y1))
     return linear(field, t0, y0, t1, y1, at) + s * (s - 1) * ((1 - 2 * s) * (y1 - y0) + (s - 1) * h * f0 + s * h * f1)
 
 
@@ -333,15 +257,15 @@ def cubic(field, t0, y0, t1, y1, at):
     [(linear, 5, "violated"), (linear, 2, "note"), (cubic, 5, "note"), (linear, 0, "note")],
 )
 def test_what_lies_between_steps_is_tried_beside_the_order(between, order, verdict) -> None:
-    peer = double_peer("dense", order, lambda given: dopri(given, between))
-    found = integrator_check._judged("between", integrator_check._Contract(of_callable(peer))._between_steps)
+    peer = double_peer("dense", order, dopri(between))
+    found = judged(of_callable(peer), "between steps")
     assert (found.verdict, "between steps" in found.text) == (verdict, True)
 
 
 def test_a_count_that_explains_no_error_is_said_and_no_failure() -> None:
     """Many steps too many make single steps short: a row says so, and accuses nobody."""
-    honest = double_peer("honest", 5, lambda given: dopri(given, cubic))
-    many = double_peer("many", 5, lambda given: replace(found := dopri(given, cubic), steps=1000 * found.steps))
+    honest = double_peer("honest", 5, solve := dopri(cubic))
+    many = double_peer("many", 5, lambda given: replace(found := solve(given), steps=1000 * found.steps))
     said = [_said(row(of_callable(peer), times=(Fraction(1, 4),))) for peer in (honest, many)]
     assert ["do not explain" in text for text in said] == [False, False]
 
@@ -371,9 +295,8 @@ def test_a_step_that_underflows_is_a_note_that_says_what_was_asked(tmp_path: Pat
     )
     (tmp_path / "m.py").write_text(text)
     which = msgspec.structs.replace(program("ab4"), command=(sys.executable, "-S", "-E", str(tmp_path / "m.py"), "ab4"))
-    contract = integrator_check._Contract(which)
-    assert integrator_check._judged("one", dict(contract.parts())["one time"]).verdict == "kept"
-    found = integrator_check._judged("huge", contract._huge)
+    assert judged(which, "one time").verdict == "kept"
+    found = judged(which, integrator_check._TOO_FAST)
     assert (found.verdict, found.text) == (
         "note",
         "At |Ω| = 1e150, t = 1 it gives no finite state: ab4 did not say done within 2 s",

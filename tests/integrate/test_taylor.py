@@ -12,35 +12,22 @@ from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
+from support.helpers import bits
 
 TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
 START = State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5"))
 
 
-def bits(run) -> list[list[Fraction]]:
-    return [[exact(value) for value in state] for state in run.states]
-
-
-def test_chunks_of_any_length_change_no_bit(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = propagate(TOP, START, [200], DOUBLE)
-    monkeypatch.setattr(Stepper, "_steps_short_of", lambda self, target: 1)
-    single = propagate(TOP, START, [200], DOUBLE)
-    assert bits(single) == bits(whole)
-    assert single.steps == whole.steps
-
-
-def test_a_chunk_that_goes_too_far_is_taken_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = propagate(TOP, START, [50, 100], DOUBLE)
-    original = Stepper._steps_short_of
-
-    def too_many(self: Stepper, target: object) -> int:
-        count = original(self, target)
-        return count if count == 1 else 2 * count
-
-    monkeypatch.setattr(Stepper, "_steps_short_of", too_many)
-    rash = propagate(TOP, START, [50, 100], DOUBLE)
-    assert bits(rash) == bits(whole)
-    assert rash.steps == whole.steps
+@pytest.mark.parametrize(
+    "changed",
+    [lambda count: 1, lambda count: count if count == 1 else 2 * count],
+    ids=["one by one", "too far, and taken back"],
+)
+def test_chunks_of_any_length_change_no_bit(monkeypatch: pytest.MonkeyPatch, changed) -> None:
+    usual, original = propagate(TOP, START, [50, 200], DOUBLE), Stepper._steps_short_of
+    monkeypatch.setattr(Stepper, "_steps_short_of", lambda self, target: changed(original(self, target)))
+    other = propagate(TOP, START, [50, 200], DOUBLE)
+    assert (bits(other), other.steps) == (bits(usual), usual.steps)
 
 
 @pytest.mark.parametrize("omega", [(0, 4, 2), (0, 2, 4), ("1/1000", 3, 0), (8, 1, 1)], ids=str)

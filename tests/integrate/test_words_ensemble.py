@@ -11,11 +11,12 @@ from heavytop.errors import InputError
 from heavytop.integrate.multiword import lanes
 from heavytop.integrate.multiword.lanes import propagate_multiword_ensemble
 from heavytop.integrate.multiword.motions import propagate_multiword
-from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, QUAD, exact
+from heavytop.integrate.trajectory import Outcome, Problem
+from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, QUAD
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
+from support.helpers import bits, distance
 
 TOP = HeavyTop((2, 2, 1), 1, (0, 1, 0))
 SLEEPING = HeavyTop((2, 2, 1), 1, (0, 0, 1))
@@ -35,10 +36,6 @@ def problems(precision=DOUBLE, count: int = 19) -> list[Problem]:
     return found
 
 
-def bits(run: Trajectory) -> list[list[Fraction]]:
-    return [[exact(value) for value in state] for state in run.states]
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("precision", [DOUBLE, DOUBLE_DOUBLE], ids=lambda p: p.name)
 @pytest.mark.parametrize("sign", [1, -1], ids=["forwards", "backwards"])
@@ -50,8 +47,7 @@ def test_each_motion_is_that_of_a_run_by_itself(precision, sign: int) -> None:
         assert run.outcome is Outcome.SUCCESS
         assert run.problem == problem
         assert run.times == alone.times
-        off = max(abs(a - b) for p, q in zip(bits(run), bits(alone), strict=True) for a, b in zip(p, q, strict=True))
-        assert off <= (precision.eps if precision is DOUBLE else 3000 * precision.eps)
+        assert distance(run, alone) <= (precision.eps if precision is DOUBLE else 3000 * precision.eps)
         assert (run.steps == 0) == (alone.steps == 0)
 
 
@@ -65,9 +61,7 @@ def test_every_tolerance_is_kept_in_lanes(exponent: int) -> None:
         runs = propagate_multiword_ensemble(given, TIMES, tolerance=tolerance)
         for run, exact_run in zip(runs, propagate_multiword_ensemble(given, TIMES), strict=True):
             assert run.outcome is Outcome.SUCCESS
-            pairs = zip(bits(run), bits(exact_run), strict=True)
-            off = max(abs(a - b) for p, q in pairs for a, b in zip(p, q, strict=True))
-            assert off <= 1000 * tolerance
+            assert distance(run, exact_run) <= 1000 * tolerance
             assert (run.steps == 0) == (exact_run.steps == 0)
 
 
@@ -93,8 +87,7 @@ def test_motions_that_outgrow_n0_go_on_where_they_were_and_are_right(monkeypatch
     raised = propagate_multiword_ensemble(given, TIMES, threads=2)
     for a, b in zip(runs, raised, strict=True):
         assert a.times == b.times
-        off = max(abs(x - y) for p, q in zip(bits(a), bits(b), strict=True) for x, y in zip(p, q, strict=True))
-        assert off <= DOUBLE.eps
+        assert distance(a, b) <= DOUBLE.eps
 
 
 def test_each_motion_has_the_outcome_it_has() -> None:
@@ -154,8 +147,7 @@ def test_the_gyrostat_goes_in_lanes_too() -> None:
     given = [Problem.of(top, start, DOUBLE_DOUBLE, GYROSTAT)] * 2
     alone = propagate_multiword(top, start, TIMES, DOUBLE_DOUBLE, system=GYROSTAT)
     for run in propagate_multiword_ensemble(given, TIMES):
-        off = max(abs(a - b) for p, q in zip(bits(run), bits(alone), strict=True) for a, b in zip(p, q, strict=True))
-        assert off < Fraction(1, 10**29)
+        assert distance(run, alone) < Fraction(1, 10**29)
 
 
 def test_what_is_no_ensemble_is_refused() -> None:

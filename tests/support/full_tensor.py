@@ -10,9 +10,7 @@ from typing import Any
 import mpmath
 
 from heavytop.precision import exact
-
-_ORDER = 36
-_DIGITS = 46
+from heavytop.top.heavy_top import HeavyTop, State
 
 
 def rotation(q: Sequence[Fraction]) -> tuple[tuple[Fraction, ...], ...]:
@@ -26,10 +24,24 @@ def rotation(q: Sequence[Fraction]) -> tuple[tuple[Fraction, ...], ...]:
     )
 
 
-def integrate(tensor: Any, moment: Any, rotor: Any, rows: Any, omega: Any, time: Fraction) -> list[Fraction]:
-    """(Ω, γ, ξ) at ``time``, right to some 40 digits over short times."""
-    mp = mpmath.MPContext()
-    mp.dps = _DIGITS
+def integrate_top(top: HeavyTop, start: State, time: Fraction, xi: Any, digits: int = 40) -> list[Fraction]:
+    """(Ω, γ, ξ) at ``time`` of a top on its principal axes, in a unit of time of its own."""
+    k = top.rotor or (0, 0, 0)
+    unit = max(1, *map(abs, start.omega), *map(abs, k))
+    tensor = [[i * (row == column) for column in range(3)] for row, i in enumerate(top.inertia)]
+    moment, rotor, omega = (
+        [x / u for x in part] for part, u in ((top.moment, unit**2), (k, unit), (start.omega, unit))
+    )
+    found = integrate(tensor, moment, rotor, (xi, None, start.gamma), omega, time * unit, digits)
+    return [*(unit * w for w in found[:3]), *found[3:]]
+
+
+def integrate(
+    tensor: Any, moment: Any, rotor: Any, rows: Any, omega: Any, time: Fraction, digits: int = 40
+) -> list[Fraction]:
+    """(Ω, γ, ξ) at ``time``, right to some so many digits over short times."""
+    mp, order = mpmath.MPContext(), int(0.9 * digits)
+    mp.dps = digits + 6
 
     def number(value: Any) -> Any:
         return mp.mpf(Fraction(value).numerator) / Fraction(value).denominator
@@ -41,12 +53,12 @@ def integrate(tensor: Any, moment: Any, rotor: Any, rows: Any, omega: Any, time:
     left, sign = number(abs(time)), 1 if time >= 0 else -1
     while left > 0:
         series = [[x] for x in state]
-        for m in range(_ORDER):
+        for m in range(order):
             found = [*_rates(series, m, j, inverse, n, k, mp), *_turned(series, 3, m), *_turned(series, 6, m)]
             for row, rate in zip(series, found, strict=True):
                 row.append(sign * rate / (m + 1))
         last = max(abs(row[-1]) for row in series)
-        step = min(left, mp.mpf(10) ** (-mp.mpf(_DIGITS - 4) / _ORDER) / last ** (mp.mpf(1) / _ORDER) if last else left)
+        step = min(left, (mp.mpf(10) ** -(digits + 2) / last) ** (mp.mpf(1) / order) if last else left)
         state = [mp.polyval(row[::-1], step) for row in series]
         left -= step
     return [exact(x) for x in state]

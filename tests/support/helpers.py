@@ -10,7 +10,9 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+from heavytop.harness import integrator_check
 from heavytop.integrate import registry
+from heavytop.integrate.registry import IntegratorSource
 from heavytop.integrate.trajectory import Trajectory
 from heavytop.precision import exact
 from heavytop.top.equations import HEAVY_GYROSTAT, System
@@ -52,10 +54,20 @@ def run_peer(name: str, *problem: Any, setting: tuple[str, Fraction] | None = No
     return registry.ready(name, setting)(*problem, **options)
 
 
+def bits(run: Trajectory) -> list[list[Fraction]]:
+    """The exact values of all states."""
+    return [[exact(value) for value in state] for state in run.states]
+
+
 def distance(one: Trajectory, other: Trajectory) -> Fraction:
     """The largest difference of two components, exactly."""
-    pairs = zip(one.states, other.states, strict=True)
-    return max(abs(exact(a) - exact(b)) for first, second in pairs for a, b in zip(first, second, strict=True))
+    pairs = zip(bits(one), bits(other), strict=True)
+    return max(abs(a - b) for first, second in pairs for a, b in zip(first, second, strict=True))
+
+
+def judged(which: IntegratorSource, part: str) -> integrator_check.Checked:
+    """One part of the contract alone."""
+    return integrator_check._judged(part, dict(integrator_check._Contract(which).parts())[part])
 
 
 def without_progress(errors: str) -> str:

@@ -131,6 +131,17 @@ def extrapolation(weight=4 / 3):
     return advance
 
 
+def one_step(step):
+    """A method without a memory."""
+
+    def advance(f, y, h):
+        while True:
+            y = step(f, y, h)
+            yield y
+
+    return advance
+
+
 HEALTHY = {
     "ab2": (adams_bashforth(AB2, euler), 2),
     "ab4": (adams_bashforth(AB4, rk4), 4),
@@ -150,7 +161,7 @@ FAULTY = {
     "extrapolation_weight": (extrapolation(1.3), 4),
     "corrected_last": (predictor_corrector(-5.001 / 24), 4),
 }
-METHODS = HEALTHY | FAULTY
+METHODS = HEALTHY | FAULTY | {"classical": (one_step(rk4), 4)}
 
 
 def states(advance, f, y, times, step):
@@ -175,6 +186,17 @@ def solver(advance):
     return solve
 
 
+def with_quaternion(p, y):
+    """(Ω', q') of the heavy top: q' = ½ q (0, Ω)."""
+    from heavytop.top.attitude import matrix_of_quaternion
+    from heavytop.top.equations import HEAVY_TOP
+
+    (a, b, c), (w, x, y_, z) = y[:3], y[3:]
+    rates = HEAVY_TOP.field(p, (a, b, c, *matrix_of_quaternion(y[3:])[2]))[:3]
+    turned = (-x * a - y_ * b - z * c, w * a + y_ * c - z * b, w * b + z * a - x * c, w * c + x * b - y_ * a)
+    return [*rates, *(part / 2 for part in turned)]
+
+
 def serve(name):
     from heavytop.top.equations import HEAVY_TOP, Parameters
 
@@ -186,11 +208,14 @@ def serve(name):
         if key == "quit":
             return
         if key == "go":
-            inertia, moment, y = ([float(word) for word in given[part]] for part in ("inertia", "moment", "state"))
+            inertia, moment, y, q = (
+                [float(word) for word in given.get(part, ())] for part in ("inertia", "moment", "state", "quaternion")
+            )
             p = Parameters(inertia, moment, 0.0)
+            field, y = (with_quaternion, y[:3] + q) if q else (HEAVY_TOP.field, y)
             times, step = given["times"][1:], float(given.get("setting", ["0.01"])[0])
             counts = [0]
-            found = states(METHODS[name][0], lambda y, p=p: HEAVY_TOP.field(p, y), y, map(float, times), step)
+            found = states(METHODS[name][0], lambda y, p=p, field=field: field(p, y), y, map(float, times), step)
             for text, (state, count) in zip(times, found, strict=True):
                 print("state", text, *map(repr, state))
                 counts.append(count)
