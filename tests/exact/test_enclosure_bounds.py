@@ -18,6 +18,7 @@ from heavytop.exact.enclosure.step import CAP, Errors, Node, Whole, quadratic, s
 from heavytop.exact.flint.balls import midpoint, radius, working_precision
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
+from support.helpers import rational
 from support.proofs import assert_overlap
 
 TOP = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
@@ -159,10 +160,6 @@ def test_a_set_of_errors_is_as_large_as_its_components_say():
                 true = sum(abs(a) * Fraction(float(r)) for a, r in zip(row, errors.radii, strict=True))
                 true += Fraction(more) * widest
                 assert true <= Fraction(float(bound)) <= true * (1 + Fraction(1, 2**30))
-
-
-def rational(value):
-    return fmpq(value.numerator, value.denominator)
 
 
 def exact_variation(found, top):

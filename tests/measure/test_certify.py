@@ -2,7 +2,6 @@
 
 import json
 from fractions import Fraction
-from pathlib import Path
 
 import msgspec
 import pytest
@@ -22,22 +21,38 @@ from heavytop.measure.scalar import GUARD_BITS
 from heavytop.measure.truth import certified
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
+from support.helpers import VECTORS, start_of, top_of
 
-VECTORS = json.loads((Path(__file__).parents[1] / "data" / "vectors.json").read_text(encoding="utf-8"))
 KNOWN = [DeloneHomoclinic(Fraction(1), Fraction(1)), ErshkovPartial(Fraction(1), Fraction(6), Fraction(1))]
 
 
-class Shifted:
-    """A closed form that is wrong by ``error`` in its second component after a time."""
+class Changed:
+    """A motion of which ``change`` makes other balls, from the right ones and the time."""
 
-    def __init__(self, known, error, after):
-        self.known, self.error, self.after = known, error, after
-        self.method, self.system, self.top, self.start = known.method, known.system, known.top, known.start
+    def __init__(self, known, change, method="changed"):
+        self.known, self.change = known, change
+        self.method, self.source, self.system, self.top, self.start = method, "", known.system, known.top, known.start
 
     def state(self, time, bits):
         values = self.known.state(time, bits)
-        with working_precision(bits + 32):
-            return [values[0], values[1] + (self.error if abs(time) > self.after else 0), *values[2:]]
+        with working_precision(bits + 200):
+            return self.change(values, time)
+
+
+def shifted(known, error, after=5):
+    """A closed form that is wrong by ``error`` in its second component after a time."""
+    return Changed(known, lambda values, time: [values[0], values[1] + error * (abs(time) > after), *values[2:]])
+
+
+def blurred(known, radius, until=None):
+    """A motion known within ``radius``, at all times or up to one."""
+    wide = arb(0, radius)
+    return Changed(known, lambda balls, t: [b + wide for b in balls] if not until or 0 < abs(t) <= until else balls)
+
+
+def fixed(middle, radius, scale=-100):
+    """Six equal balls, of integers times 2^scale."""
+    return [arb((middle, scale), (radius, scale))] * 6
 
 
 @pytest.mark.slow
@@ -73,21 +88,21 @@ def test_a_second_closed_form_certifies_far_times_at_the_time_itself(known):
 
 
 def test_a_second_closed_form_that_excludes_the_first_is_a_contradiction():
-    class Wrong(Shifted):
-        def second_state(self, time, bits):
-            return Shifted(self.known, arb("1e-40"), 5).state(time, bits)
-
+    wrong = shifted(KOVALEVSKAYA, 0)
+    wrong.second_state = shifted(KOVALEVSKAYA, arb("1e-40")).state
     with pytest.raises(Contradiction, match="its second closed form exclude each other at t = 1e\\+06"):
-        certify(Wrong(KOVALEVSKAYA, arb(0), 5), Fraction(10**6), 50)
+        certify(wrong, Fraction(10**6), 50)
 
 
 def test_a_wrong_closed_form_is_refused():
     with pytest.raises(Contradiction, match="exclude each other at t = 8: component 2 differs at digit 29"):
-        certify(Shifted(KNOWN[0], arb("1e-30"), 5), Fraction(8), 50)
+        certify(shifted(KNOWN[0], arb("1e-30")), Fraction(8), 50)
+    with pytest.raises(Contradiction, match="exclude each other"):
+        certified(shifted(KNOWN[0], arb("1e-17")), Fraction(8), 117)
 
 
 def test_a_formula_wrong_only_far_away_loses_its_digits():
-    certificate = certify(Shifted(KNOWN[0], arb("1e-20"), 10**5), Fraction(10**6), 50)
+    certificate = certify(shifted(KNOWN[0], arb("1e-20"), 10**5), Fraction(10**6), 50)
     assert 18 <= certificate.agreed_digits <= 20
 
 
@@ -107,8 +122,7 @@ def test_agreement_counts_the_radii():
 
 def test_reference_has_the_keys_that_scripts_rely_on_and_holds_the_reference_states():
     vector = VECTORS[0]
-    top = HeavyTop(vector["inertia"], vector["weight"], vector["centre"])
-    record = reference(top, State(vector["omega"], vector["gamma"]), ["1/3", vector["time"]], 60)
+    record = reference(top_of(vector), start_of(vector), ["1/3", vector["time"]], 60)
     document = json.loads(msgspec.json.encode(record))
     assert {"method", "digits", "times", "states"} <= set(document)
     assert document["times"] == ["1/3", "8"]
@@ -127,74 +141,35 @@ def test_reference_serves_the_gyrostat():
 TURNING = Euler(HeavyTop((3, 2, 1), 1, (0, 0, 0)), State((1, "1/2", "-1/3"), ("2/3", "-1/3", "2/3")))
 
 
-class Late(Shifted):
-    """A motion that goes too fast by a part of 10^-30 after t = 5: its first integrals are right throughout."""
-
-    def __init__(self):
-        super().__init__(TURNING, 0, 5)
-
-    def state(self, time, bits):
-        return self.known.state(time * (1 + Fraction(1, 10**30)) if abs(time) > 5 else time, bits)
+# too fast by a part of 10^-30 after t = 5: its first integrals are right throughout
+LATE = Changed(TURNING, lambda v, t: TURNING.state(t * (1 + Fraction(1, 10**30)), 400) if abs(t) > 5 else v)
 
 
-class WideAtFirst(Shifted):
-    """A motion known to 25 digits only up to t = 5."""
-
-    def __init__(self):
-        super().__init__(TURNING, 0, 5)
-
-    def state(self, time, bits):
-        values = self.known.state(time, bits)
-        with working_precision(bits + 32):
-            return [value + arb(0, 1e-25) for value in values] if 0 < abs(time) <= 5 else values
-
-
-@pytest.mark.parametrize(("solution", "least", "most"), [(TURNING, 50, 99), (Late(), 25, 31), (WideAtFirst(), 23, 25)])
+@pytest.mark.parametrize(
+    ("solution", "least", "most"), [(TURNING, 50, 99), (LATE, 25, 31), (blurred(TURNING, 1e-25, 5), 23, 25)]
+)
 def test_each_end_counts_where_the_middle_is_out_of_reach(solution, least, most):
     certificate = certify(solution, Fraction(10**6), 50)
     assert certificate.kind == "proven at both ends"
     assert least <= certificate.agreed_digits <= most
 
 
-class Blurred(Shifted):
-    """A motion known within ``radius`` at all times."""
-
-    def __init__(self, radius):
-        super().__init__(TURNING, 0, 5)
-        self.radius = radius
-
-    def state(self, time, bits):
-        with working_precision(bits + 32):
-            return [value + arb(0, self.radius) for value in self.known.state(time, bits)]
-
-
 def test_a_motion_scores_only_what_has_three_digits_less_than_it():
     """In double precision, of 15 whole digits: 18 are needed."""
-    assert certified(Blurred(9e-19), Fraction(1), 53 + GUARD_BITS) is not None
-    assert certified(Blurred(1.1e-18), Fraction(1), 53 + GUARD_BITS) is None
-
-
-class Fixed:
-    """One ball m ± r in all six components, whatever is asked; the state at 0 is that of a known motion."""
-
-    def __init__(self, middle, radius):
-        self.middle, self.radius = middle, radius
-        known = KNOWN[0]
-        self.method, self.system, self.top, self.start = "fixed", known.system, known.top, known.start
-
-    def state(self, time, bits):
-        with working_precision(300):
-            return [arb((self.middle, -100), (self.radius, -100))] * 6
+    assert certified(blurred(TURNING, 9e-19), Fraction(1), 53 + GUARD_BITS) is not None
+    assert certified(blurred(TURNING, 1.1e-18), Fraction(1), 53 + GUARD_BITS) is None
 
 
 @pytest.mark.parametrize("middle", [0, 1 << 90])
 def test_balls_that_just_touch_agree_and_balls_just_apart_contradict(middle):
-    one = Fixed(middle, 1000)
-    certify(one, Fraction(1), 20, enclosure=Fixed(middle + 3000, 2000))
-    certify(one, Fraction(1), 20, enclosure=Fixed(middle - 3000, 2000))
-    for apart in (3001, -3001):
+    def always(middle, radius):
+        return Changed(KNOWN[0], lambda *_: fixed(middle, radius))
+
+    one = always(middle, 1000)
+    for sign in (1, -1):
+        certify(one, Fraction(1), 20, enclosure=always(middle + sign * 3000, 2000))
         with pytest.raises(Contradiction, match="component 1"):
-            certify(one, Fraction(1), 20, enclosure=Fixed(middle + apart, 2000))
+            certify(one, Fraction(1), 20, enclosure=always(middle + sign * 3001, 2000))
 
 
 @pytest.mark.parametrize(
@@ -203,7 +178,7 @@ def test_balls_that_just_touch_agree_and_balls_just_apart_contradict(middle):
 def test_agreed_digits_are_those_of_the_farthest_points_of_two_balls(first, second):
     apart = Fraction(abs(first[0] - second[0]) + first[1] + second[1], 2**100)
     size = max(Fraction(1), Fraction(abs(first[0]), 2**100))
-    digits = agreed_digits(Fixed(*first).state(0, 0), Fixed(*second).state(0, 0))
+    digits = agreed_digits(fixed(*first), fixed(*second))
     assert Fraction(1, 10 ** (digits + 1)) < apart / size <= Fraction(1, 10**digits)
 
 
@@ -216,23 +191,11 @@ def test_digits_of_a_gap_are_exact_at_powers_of_ten():
             assert _digits(gap) == max(0, found)
 
 
-class Wide:
-    """A solution that gives fewer digits than it was asked for: balls of ``radius`` around (1, 0, ...)."""
-
-    method, source, system = "too wide", "", KNOWN[0].system
-
-    def __init__(self, middle, radius):
-        self.middle, self.radius = middle, radius
-
-    def state(self, time, bits):
-        with working_precision(200):
-            return [arb(self.middle, self.radius), *[arb(0)] * 5]
-
-
 @pytest.mark.parametrize(("middle", "wide", "narrow"), [("100", "1e-28", "0.9e-28"), ("0", "1.01e-30", "0.99e-30")])
 def test_a_radius_beyond_the_digits_promised_is_not_printed(middle, wide, narrow):
     def asked(radius):
-        return reference(KNOWN[0].top, KNOWN[0].start, ["1"], 30, finder=lambda *_: Wide(middle, radius))
+        wide = Changed(KNOWN[0], lambda *_: [arb(middle, radius), *[arb(0)] * 5], "too wide")
+        return reference(KNOWN[0].top, KNOWN[0].start, ["1"], 30, finder=lambda *_: wide)
 
     assert Fraction(asked(narrow).states[0][0].radius) >= Fraction(narrow)
     with pytest.raises(OutOfReach, match="not to 30 digits, by too wide"):

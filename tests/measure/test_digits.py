@@ -3,11 +3,15 @@
 import json
 import math
 from fractions import Fraction
+from io import StringIO
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from heavytop.cases import CASES
+from heavytop.exact.catalogue import find
+from heavytop.exact.flint.balls import midpoint
 from heavytop.features.score.measurement import measured
 from heavytop.features.score.trajectories.observed import GivenTrajectory
 from heavytop.integrate.trajectory import Outcome, Problem
@@ -28,17 +32,14 @@ CASE = CASES["lagrange"]
 
 def given(errors: dict[tuple[int, int], Fraction], precision=DOUBLE, omega_scale: int = 1) -> GivenTrajectory:
     """The known motion of a Lagrange top, spoilt at (sample, component); ``omega_scale``: how much faster it turns."""
-    from heavytop.exact.catalogue import find
-
     top = type(CASE.top)(CASE.top.inertia, CASE.top.weight, CASE.top.centre)
     start = type(CASE.start)([omega_scale * w for w in CASE.start.omega], CASE.start.gamma)
     problem = Problem.of(top, start, precision)
     solution = find(problem.top, problem.start)
     states = []
     for index, time in enumerate(TIMES):
-        balls = solution.state(time, 300)
-        middle = [int(m) * Fraction(2) ** int(e) for m, e in (value.mid().man_exp() for value in balls)]
-        states.append(tuple(value + errors.get((index, i), Fraction(0)) for i, value in enumerate(middle)))
+        middles = map(midpoint, solution.state(time, 300))
+        states.append(tuple(value + errors.get((index, i), Fraction(0)) for i, value in enumerate(middles)))
     return GivenTrajectory(
         "mine", "rk4", top, start, problem.system, precision, TIMES, states, Outcome.SUCCESS, 4, {}, "0" * 64
     )
@@ -50,9 +51,7 @@ def recomputed(given: GivenTrajectory) -> float:
     solution = known_motion(problem, given.times[-1]).solution
     worst = Fraction(0)
     for time, state in zip(given.times, given.states, strict=True):
-        for value, ball in zip(state, solution.state(time, 300), strict=True):
-            mantissa, exponent = ball.mid().man_exp()
-            true = int(mantissa) * Fraction(2) ** int(exponent)
+        for value, true in zip(state, map(midpoint, solution.state(time, 300)), strict=True):
             worst = max(worst, abs(value - true) / max(1, abs(true)))
     return -math.log10(worst)
 
@@ -127,25 +126,22 @@ def test_every_surface_says_the_same(tmp_path: Path) -> None:
     assert f"{said} of 16 digits right to T = 4" in html.report_page(report)
 
 
+def printed(block: object) -> str:
+    console = Console(width=200, record=True, file=StringIO())
+    console.print(block)
+    return console.export_text()
+
+
 def test_the_summary_of_many_rows_names_the_fewest() -> None:
-    from io import StringIO
-
-    from rich.console import Console
-
     rows = [
         row(case=f"top[{i}]", metrics={RELATIVE.text: error(value)}) for i, value in enumerate(("1e-9", "3e-5", "1e-7"))
     ]
-    console = Console(width=160, record=True, file=StringIO())
-    console.print(worst(Report(SCHEMA, {"name": "many"}, {}, []), rows, "hint"))
-    (line,) = [line for line in console.export_text().splitlines() if "digits right, fewest" in line]
+    text = printed(worst(Report(SCHEMA, {"name": "many"}, {}, []), rows, "hint"))
+    (line,) = [line for line in text.splitlines() if "digits right, fewest" in line]
     assert line.split()[-2:] == ["4.5", "top[1]"]
 
 
 def test_rounding_noise_stands_beside_the_number_it_belongs_to() -> None:
-    from io import StringIO
-
-    from rich.console import Console
-
     metrics = {
         "drift_energy_max": replace(error("3e-15"), band=0.21),
         "solution_error_along_max": replace(error("2e-13"), band=0.34),
@@ -154,9 +150,7 @@ def test_rounding_noise_stands_beside_the_number_it_belongs_to() -> None:
     homoclinic = {"break_away_time": replace(error("35"), kind="duration", band=0.02)}
     homoclinic |= {"solution_error_omega_max": replace(error("1e-13"), band=0.9)}
     rows = [row(metrics=metrics, samples=100), row(case="saddle", measure="homoclinic", metrics=homoclinic)]
-    console = Console(width=200, record=True, file=StringIO())
-    console.print(summary(Report(SCHEMA, {"name": "two"}, {}, rows)))
-    text = console.export_text()
+    text = printed(summary(Report(SCHEMA, {"name": "two"}, {}, rows)))
     for said in ("energy 3e-15 ± 0.21", "2e-13 ± 0.34", "35 ± 0.02", "1e-13 ± 0.90", "largest over 100 samples"):
         assert said in text, said
     assert "1e-14 ±" not in text

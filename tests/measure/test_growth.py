@@ -192,11 +192,6 @@ def test_the_band_holds_the_rms_of_other_starts() -> None:
     assert band(numpy.where(values > 1, values, numpy.nan)) is None
 
 
-def test_the_same_starts_give_the_same_bits() -> None:
-    errors = synthetic("walk", numpy.random.default_rng(9))
-    assert law(Ensemble(TIMES, errors, STEP)) == law(Ensemble(TIMES, errors.copy(), STEP))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("starts", "spread"), [(16, 0.12), (64, 0.05)])
 def test_the_interval_of_a_rate_holds_the_median_of_rates_that_scatter(starts: int, spread: float) -> None:
@@ -241,18 +236,11 @@ def test_what_all_starts_share_widens_the_interval_of_a_power() -> None:
 @pytest.mark.parametrize("kind", ["bounded", "walk"])
 def test_an_error_that_jumps_has_no_law(kind: str, decades: int) -> None:
     """In the middle of the span a jump of 3 decades has the slope of t^1.5, and one of 8 rises like an exponential."""
-    for part in (0.25, 0.5, 0.8, 0.95):
+    # the law is fitted to the last three decades
+    late = (0.1, 0.3, 0.5, 0.7, 0.9) if decades == 8 else ()
+    for share in (*(10 ** (3 * (part - 1)) for part in (0.25, 0.5, 0.8, 0.95)), *late):
         errors = synthetic(kind, numpy.random.default_rng(23))
-        # the law is fitted to the last three decades
-        errors[:, TIMES[-1] / 10 ** (3 * (1 - part)) < TIMES] *= 10**decades
+        errors[:, share * TIMES[-1] < TIMES] *= 10**decades
         found = law(Ensemble(TIMES, errors, STEP))
         assert found.growth == "unresolved"
         assert not inconsistent(found)
-
-
-@pytest.mark.slow
-def test_an_error_that_jumps_late_in_time_is_no_exponential() -> None:
-    for part in (0.1, 0.3, 0.5, 0.7, 0.9):
-        errors = synthetic("bounded", numpy.random.default_rng(29))
-        errors[:, part * TIMES[-1] < TIMES] *= 1e8
-        assert law(Ensemble(TIMES, errors, STEP)).growth == "unresolved"

@@ -7,10 +7,9 @@ import pytest
 
 import heavytop as ht
 from heavytop.cases import CASES
-from heavytop.errors import Contradiction
-from heavytop.exact.flint.balls import ball, midpoint, radius, working_precision
+from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.integrate.trajectory import Problem
-from heavytop.measure.truth import Known, certified, known_motion
+from heavytop.measure.truth import Known, known_motion
 from heavytop.precision import DOUBLE, QUAD
 from heavytop.top.heavy_top import HeavyTop, State
 from support.in_process import heavytop
@@ -53,38 +52,6 @@ def test_the_rounded_gyrostat_keeps_the_rotor_of_the_exact_data() -> None:
     known = known_motion(given, Fraction(3))
     assert isinstance(known, Known)
     assert known.solution.parameters.rotor == given.parameters.rotor
-
-
-class Wrong:
-    """A closed form that is wrong by 1e-17: it must not serve as a reference of 19 digits and more."""
-
-    def __init__(self, true) -> None:
-        self.true = true
-        self.method, self.system, self.top, self.start = "wrong", true.system, true.top, true.start
-
-    def state(self, time: Fraction, bits: int):
-        first, *rest = self.true.state(time, bits)
-        with working_precision(bits + 32):
-            return [first + ball(Fraction(1, 10**17)), *rest]
-
-
-def test_a_reference_that_its_second_source_excludes_scores_nothing() -> None:
-    known = known_motion(problem("euler"), Fraction(3))
-    assert isinstance(known, Known)
-    with pytest.raises(Contradiction, match="exclude each other"):
-        certified(Wrong(known.solution), Fraction(3), 117)
-
-
-def test_a_reference_with_fewer_digits_than_the_format_scores_nothing() -> None:
-    class Blurred(Wrong):
-        def state(self, time: Fraction, bits: int):
-            first, *rest = self.true.state(time, bits)
-            with working_precision(bits + 32):
-                return [first + ball(Fraction(1, 10**12)) * ball(0).union(ball(1)), *rest]
-
-    known = known_motion(problem("euler"), Fraction(3))
-    assert isinstance(known, Known)
-    assert certified(Blurred(known.solution), Fraction(3), 117) is None
 
 
 @pytest.mark.parametrize(

@@ -15,13 +15,11 @@ from heavytop.multiword.fixed_point.first_variation import WordColumns
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 from multiword.test_proven import extreme_centre, rounded
+from support.helpers import moments_of_a_body
 
 
 def some(random: Random, system) -> Validated:
-    while True:
-        moments = [Fraction(random.randint(32, 288), 96) for _ in range(3)]
-        if 2 * max(moments) <= sum(moments):
-            break
+    moments = moments_of_a_body(random)
     centre = [Fraction(random.randint(-4096, 4096), 4096) for _ in range(3)]
     rotor = (1, "1/2", "-1/3") if system is HEAVY_GYROSTAT else None
     start = State(

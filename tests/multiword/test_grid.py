@@ -23,6 +23,7 @@ from heavytop.multiword.fixed_point.fixed_point_run import Fixed
 from heavytop.multiword.fixed_point.steps import build, sample_row
 from heavytop.multiword.problem import Scaled, Status
 from heavytop.top.equations import HEAVY_TOP, Parameters
+from support.helpers import moments_of_a_body
 from support.words_helpers import LEVELS, problem
 
 HORIZON = 2
@@ -31,14 +32,11 @@ WRONG_ULP = 1e6
 
 def random_problem(random: Random) -> Scaled:
     """A top that a rigid body can have, |P r| up to 2 and |Ω| up to 3."""
-    while True:
-        moments = [Fraction(random.randint(32, 288), 96) for _ in range(3)]
-        if 2 * max(moments) <= sum(moments):
-            break
+    moments = moments_of_a_body(random)
     weights = tuple(Fraction(random.randint(-4096, 4096), 4096) for _ in range(3))
     omega = [Fraction(random.randint(-7000, 7000), 4096) for _ in range(3)]
     gamma = [Fraction(random.randint(-2300, 2300), 4096) for _ in range(3)]
-    p = Parameters(tuple(moments), weights, Fraction(0))
+    p = Parameters(moments, weights, Fraction(0))
     return Scaled.of(HEAVY_TOP, p, (*omega, *gamma), bounded=True)
 
 

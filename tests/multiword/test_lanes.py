@@ -8,19 +8,14 @@ import pytest
 from heavytop.multiword.codegen.recurrence import coefficients, rates
 from heavytop.multiword.problem import Scaled
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
-from support.helpers import fraction, positive, rotor, vector
+from support.helpers import random_parameters, vector
 
 
 @pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda system: system.name)
 def test_the_lanes_give_the_derivative_of_the_field_exactly(system) -> None:
     random = Random(15)
     for _ in range(50):
-        lam = rotor(system, lambda: fraction(random))
-        p = Parameters(
-            (positive(random), positive(random), positive(random)),
-            vector(random),
-            lam,
-        )
+        p = random_parameters(random, system)
         y, z = [*vector(random), *vector(random)], list(vector(random))
         given = coefficients(system, p, attitude=True)
         assert rates(system, given, [*y, *z]) == [*system.field(p, y), *system.attitude(p, y, z)]
@@ -34,13 +29,7 @@ def test_scaling_is_exact_and_brings_numbers_near_one(system, size: int) -> None
     random = Random(size)
     unit = Fraction(10) ** size
     for _ in range(10):
-        lam = rotor(system, lambda: fraction(random) * unit)
-        weights = tuple(v * unit for v in vector(random))
-        p = Parameters(
-            (positive(random), positive(random), positive(random)),
-            weights,
-            lam,
-        )
+        p = random_parameters(random, system, unit)
         y = tuple(v * unit for v in vector(random)) + vector(random) + vector(random)
         scaled = Scaled.of(system, p, y)
         assert scaled.back(scaled.state) == y

@@ -15,7 +15,7 @@ from heavytop.multiword.fixed_point import arithmetic, certified_series
 from heavytop.multiword.fixed_point.arithmetic import Grid, grid_of
 from heavytop.multiword.fixed_point.certified_series import CertifiedSeries
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
-from support.helpers import rotor
+from support.helpers import moments_of_a_body, rotor
 from support.words_helpers import LEVELS
 
 
@@ -25,13 +25,10 @@ def some_motion(random: Random, system=HEAVY_TOP, attitude: bool = False, decade
     def size() -> Fraction:
         return Fraction(10) ** random.randint(-decades, decades)
 
-    while True:
-        moments = [Fraction(random.randint(32, 288), 96) for _ in range(3)]
-        if 2 * max(moments) <= sum(moments):
-            break
+    moments = moments_of_a_body(random)
     weight, speed = size(), size()
     p = Parameters(
-        tuple(moments),
+        moments,
         tuple(weight * Fraction(random.randint(-4096, 4096), 4096) for _ in range(3)),
         rotor(system, lambda: speed * Fraction(random.randint(-99, 99), 70)),
     )

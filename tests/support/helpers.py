@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from random import Random
 from typing import Any
+
+from flint import fmpq
 
 from heavytop.harness import integrator_check
 from heavytop.integrate import registry
 from heavytop.integrate.registry import IntegratorSource
 from heavytop.integrate.trajectory import Trajectory
 from heavytop.precision import exact
-from heavytop.top.equations import HEAVY_GYROSTAT, System
+from heavytop.top.equations import HEAVY_GYROSTAT, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 VECTORS = json.loads((Path(__file__).parents[1] / "data" / "vectors.json").read_text("utf-8"))
@@ -32,6 +34,38 @@ def positive(random: Random) -> Fraction:
 
 def vector(random: Random) -> tuple[Fraction, Fraction, Fraction]:
     return fraction(random), fraction(random), fraction(random)
+
+
+def moments(random: Random) -> tuple[Fraction, Fraction, Fraction]:
+    """Three positive numbers."""
+    return positive(random), positive(random), positive(random)
+
+
+def moments_of_a_body(random: Random) -> tuple[Fraction, ...]:
+    """Three of which none exceeds the sum of the others, within a factor of nine."""
+    while True:
+        found = tuple(Fraction(random.randint(32, 288), 96) for _ in range(3))
+        if 2 * max(found) <= sum(found):
+            return found
+
+
+def random_parameters(random: Random, system: System, unit: Fraction = Fraction(1)) -> Parameters:
+    return Parameters(
+        moments(random), tuple(unit * v for v in vector(random)), rotor(system, lambda: unit * fraction(random))
+    )
+
+
+def renamed(values: Sequence[Any], axes: Sequence[int]) -> list[Any]:
+    """Canonical values put on the axes (i, j, k)."""
+    found: list[Any] = [0, 0, 0]
+    for value, axis in zip(values, axes, strict=True):
+        found[axis] = value
+    return found
+
+
+def rational(value: Any) -> fmpq:
+    """The number of FLINT."""
+    return fmpq(Fraction(value).numerator, Fraction(value).denominator)
 
 
 def unit_vector(random: Random) -> tuple[Fraction, Fraction, Fraction]:

@@ -13,11 +13,11 @@ from heavytop.integrate.heyoka.engines import expressions
 from heavytop.precision import cross
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, SYSTEMS, Parameters
 from heavytop.top.heavy_top import HeavyTop, State
-from support.helpers import fraction, positive, unit_vector, vector
+from support.helpers import fraction, moments, positive, unit_vector, vector
 
 
 def random_problem(random: Random):
-    top = HeavyTop((positive(random), positive(random), positive(random)), positive(random), vector(random))
+    top = HeavyTop(moments(random), positive(random), vector(random))
     p = Parameters(top.inertia, top.moment, fraction(random))
     return p, (*vector(random), *vector(random))
 

@@ -5,7 +5,7 @@ from itertools import permutations
 from random import Random
 
 import pytest
-from flint import fmpq, fmpq_mpoly_ctx
+from flint import fmpq_mpoly_ctx
 
 from heavytop.errors import InputError
 from heavytop.exact.closed_form import orientation, renamed_state, renamed_top
@@ -29,21 +29,9 @@ from heavytop.top.equations import (
     system_of,
 )
 from heavytop.top.heavy_top import HeavyTop, State, data_texts, require_physical
-from support.helpers import fraction, positive, unit_vector, vector
+from support.helpers import fraction, moments, positive, rational, renamed, unit_vector, vector
 
 STARTS = State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
-
-
-def rational(value) -> fmpq:
-    return fmpq(Fraction(value).numerator, Fraction(value).denominator)
-
-
-def renamed(values, axes):
-    """Canonical values put on the axes (i, j, k)."""
-    out = [0, 0, 0]
-    for value, axis in zip(values, axes, strict=True):
-        out[axis] = value
-    return out
 
 
 RING = fmpq_mpoly_ctx.get(("w1", "w2", "w3", "g1", "g2", "g3"), "degrevlex")
@@ -64,7 +52,7 @@ def body(random: Random, axes, inertia, centre, rotor) -> HeavyTop:
 
 def of_every_class(random: Random, axes):
     """(name of an integral that must be offered, top)."""
-    i1, i2, i3 = positive(random), positive(random), positive(random)
+    i1, i2, i3 = moments(random)
     a, b, c, spin = positive(random), fraction(random), fraction(random), positive(random)
     rotor = vector(random)
     yield "energy", body(random, axes, (i1, i2, i3), (a, b, c), rotor)
@@ -164,9 +152,9 @@ def test_the_gyrostat_is_its_case_with_a_rotor_along_axis_2_and_no_weight() -> N
     """Ω here is Ω + λ e2 there, k = (0, −I2 λ, 0), n = 0; M, γ and every integral are the same."""
     random = Random(2)
     for _ in range(5):
-        inertia, turning = [positive(random) for _ in range(3)], fraction(random)
-        there = Parameters(tuple(inertia), (1, 2, 3), turning)
-        here = Parameters(tuple(inertia), (0, 0, 0), (0, -inertia[1] * turning, 0))
+        inertia, turning = moments(random), fraction(random)
+        there = Parameters(inertia, (1, 2, 3), turning)
+        here = Parameters(inertia, (0, 0, 0), (0, -inertia[1] * turning, 0))
         y = (*vector(random), *unit_vector(random))
         moved = (y[0], y[1] + turning, *y[2:])
         assert gyrostat(there, y) == heavy_gyrostat(here, moved)
@@ -177,7 +165,7 @@ def test_the_gyrostat_is_its_case_with_a_rotor_along_axis_2_and_no_weight() -> N
 def test_a_motion_on_renamed_axes_is_the_renamed_motion() -> None:
     random = Random(3)
     for axes in permutations(range(3)):
-        top = HeavyTop([positive(random) for _ in range(3)], 1, vector(random), vector(random))
+        top = HeavyTop(moments(random), 1, vector(random), vector(random))
         start = State(vector(random), unit_vector(random))
         other, moved = renamed_top(top, axes), renamed_state(start, axes)
         rates = heavy_gyrostat(HEAVY_GYROSTAT.parameters(top, start), start.flat)

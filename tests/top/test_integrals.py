@@ -1,6 +1,5 @@
 """Every first integral, on random rational tops and states: the derivative along the flow is exactly 0."""
 
-from fractions import Fraction
 from itertools import permutations
 from random import Random
 
@@ -11,11 +10,7 @@ from heavytop.precision import cross, dot
 from heavytop.top import equations
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, heavy_top, holding
 from heavytop.top.heavy_top import HeavyTop, State
-from support.helpers import fraction, positive, unit_vector, vector
-
-
-def rational(value) -> fmpq:
-    return fmpq(Fraction(value).numerator, Fraction(value).denominator)
+from support.helpers import fraction, moments, positive, rational, renamed, unit_vector, vector
 
 
 def derivative(integral, p: Parameters, y, field) -> fmpq:
@@ -26,17 +21,9 @@ def derivative(integral, p: Parameters, y, field) -> fmpq:
     return integral.value(exact, moving)[1]
 
 
-def renamed(values, axes):
-    """Canonical values put on the axes (i, j, k)."""
-    out = [None] * 3
-    for value, axis in zip(values, axes, strict=True):
-        out[axis] = value
-    return out
-
-
 def random_tops(random: Random, axes):
     """(name of an integral that must be offered, top, start) for every class, on renamed axes."""
-    i1, i2, i3 = positive(random), positive(random), positive(random)
+    i1, i2, i3 = moments(random)
     weight, a, b, c = positive(random), fraction(random), fraction(random), fraction(random)
     start = State(vector(random), unit_vector(random))
 
@@ -84,7 +71,7 @@ def test_every_integral_of_the_gyrostat_is_conserved_exactly_whatever_m_and_gamm
     random = Random(7)
     for equal in (False, True):
         for _ in range(20):
-            i1, i2, i3 = positive(random), positive(random), positive(random)
+            i1, i2, i3 = moments(random)
             top = HeavyTop((i1, i2, i1 if equal else i3), positive(random), (0, fraction(random), 0))
             gamma = unit_vector(random)
             parallel = State([3 * g / i for g, i in zip(gamma, top.inertia, strict=True)], gamma)
