@@ -7,7 +7,6 @@ import resource
 import signal
 import subprocess
 import sys
-import time
 from contextlib import suppress
 from pathlib import Path
 
@@ -20,40 +19,20 @@ from heavytop.features.kinds import KINDS
 from heavytop.files import line
 from heavytop.harness import rows as one_row
 from heavytop.harness.checkpoint import Checkpoint, Saved, locked
-from heavytop.records import SCHEMA, Metric, Report
-from support import in_process
-from support.reports import Row, expand, load, measure, replace, store
+from heavytop.records import SCHEMA, Report
+from support import in_process, small_reports
+from support.helpers import python, wait_until
+from support.reports import Row, drift, measure, plan_file, replace, store, tasks_of
 
 pytestmark = pytest.mark.slow
 
 VALIDATION = Path(__file__).parents[2] / "validation"
 IDENTITY = {"plan name": "tiny", "heavytop": "0.1.0"}
-PLAN = """name = "tiny"
-[[measure]]
-kind = "drift"
-cases = ["euler", "lagrange"]
-runs = [{ precision = "double", horizon = "60", samples = 60 }, { precision = "quad", horizon = "2", samples = 12 }]
-[[measure]]
-kind = "drift"
-cases = ["kovalevskaya", "gyrostat"]
-runs = [{ precision = "extended", horizon = "4", samples = 12 }]
-"""
+HEAD = 'name = "tiny"\n'
 
 
 def row(name: str) -> Row:
-    return Row(
-        case=name,
-        system="heavy_top",
-        integrator="none",
-        precision="double",
-        bits=53,
-        outcome="success",
-        horizon="1",
-        time_reached="1",
-        steps=0,
-        finite=True,
-        metrics={"e": Metric("1e-3", -3.0)},
-    )
+    return small_reports.row(case=name)
 
 
 def checkpoint(folder: Path, identity: dict[str, str] | None = None) -> Checkpoint:
@@ -90,9 +69,9 @@ class Notes(Saved):
 
 @pytest.fixture(scope="module")
 def tasks(tmp_path_factory: pytest.TempPathFactory):
-    file = tmp_path_factory.mktemp("plan") / "tiny.toml"
-    file.write_text(PLAN)
-    return expand(load(str(file))[0])
+    short = drift("kovalevskaya", "gyrostat", runs=[("extended", "4", 12)])
+    long = drift("euler", "lagrange", runs=[("double", "60", 60), ("quad", "2", 12)])
+    return tasks_of(tmp_path_factory.mktemp("plan"), HEAD + long + short)
 
 
 @pytest.mark.parametrize("index", range(6))
@@ -195,11 +174,7 @@ def forged(content: object, path: tuple, value: object) -> object:
 
 @pytest.mark.parametrize("which", ["heyoka", "multiword"])
 def test_a_forged_place_with_its_checksum_is_measured_from_the_beginning(tmp_path: Path, which: str) -> None:
-    (tmp_path / "plan.toml").write_text(
-        f'name = "p"\n[[measure]]\nkind = "drift"\ncases = ["euler"]\nintegrator = "{which}"\n'
-        'runs = [{ precision = "double", horizon = "6", samples = 4 }]\n'
-    )
-    (task,) = expand(load(str(tmp_path / "plan.toml"))[0])
+    (task,) = tasks_of(tmp_path, HEAD + drift("euler", integrator=which, runs=[("double", "6", 4)]))
     notes = Notes(None, 2)
     expected = measured_again(task, notes)
     place = msgspec.json.decode(notes.notes[0])
@@ -230,10 +205,7 @@ def measured_again(task, saved: Saved) -> bytes:
 
 
 def test_a_forged_row_with_its_checksum_is_refused_before_anything_is_measured(tmp_path: Path) -> None:
-    (tmp_path / "plan.toml").write_text(
-        'name = "p"\n[[measure]]\nkind = "drift"\ncases = ["euler", "lagrange", "gyrostat"]\n'
-        'runs = [{ precision = "double", horizon = "2", samples = 3 }]\n'
-    )
+    file = plan_file(tmp_path, HEAD + drift("euler", "lagrange", "gyrostat"))
     out, heard = tmp_path / "out", []
 
     def stop(task: object) -> None:
@@ -242,7 +214,7 @@ def test_a_forged_row_with_its_checksum_is_refused_before_anything_is_measured(t
             raise KeyboardInterrupt
 
     def run(progress, resume: bool = False):
-        return prepare(str(tmp_path / "plan.toml"), out, workers=1, resume=resume).measure(progress)
+        return prepare(file, out, workers=1, resume=resume).measure(progress)
 
     with pytest.raises(KeyboardInterrupt):
         run(stop)
@@ -354,34 +326,26 @@ def test_a_streamed_report_is_the_one_written_at_once_a_row_a_line(tmp_path: Pat
 
 
 def test_a_kill_at_every_call_that_changes_the_disk_changes_nothing(tmp_path: Path) -> None:
-    plan = tmp_path / "tiny.toml"
-    plan.write_text(PLAN.split("[[measure]]\nkind")[0] + '[[measure]]\nkind = "drift"\ncases = ["euler", "lagrange"]\n'
-                    'runs = [{ precision = "double", horizon = "2", samples = 2 }]\n')  # fmt: skip
-    done = subprocess.run(
-        [sys.executable, str(VALIDATION / "killed_everywhere.py"), str(plan), str(tmp_path / "out")],
-        capture_output=True, text=True, check=False, timeout=300,
-    )  # fmt: skip
+    plan = plan_file(tmp_path, HEAD + drift("euler", "lagrange", runs=[("double", "2", 2)]))
+    done = python(VALIDATION / "killed_everywhere.py", plan, tmp_path / "out")
     assert done.returncode == 0, done.stderr
     assert int(done.stdout) > 15
 
 
-def command(plan: Path, *options: str) -> list[str]:
-    return [sys.executable, "-m", "heavytop", "run", "--plan", str(plan), "--workers", "1", *options]
+def command(folder: Path, out: Path, *options: str) -> list[str]:
+    return ["run", "--plan", str(folder / "plan.toml"), "--workers", "1", "--out", str(out), *options]
 
 
 @pytest.fixture(scope="module")
 def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("quick")
-    (folder / "quick.toml").write_text(
-        'name = "quick"\n[[measure]]\nkind = "drift"\ncases = ["euler"]\nruns = ['
-        '{ precision = "double", horizon = "20", samples = 40 }, { precision = "quad", horizon = "2", samples = 40 }]\n'
-    )
-    assert in_process.heavytop(*command(folder / "quick.toml", "--out", str(folder / "whole"))[3:]).returncode == 0
+    plan_file(folder, HEAD + drift("euler", runs=[("double", "20", 40), ("quad", "2", 40)]))
+    assert in_process.heavytop(*command(folder, folder / "whole")).returncode == 0
     return folder
 
 
 def resumed(quick: Path, out: Path) -> subprocess.CompletedProcess[str]:
-    return in_process.heavytop(*command(quick / "quick.toml", "--out", str(out), "--resume")[3:])
+    return in_process.heavytop(*command(quick, out, "--resume"))
 
 
 def rows_of(folder: Path) -> list[dict]:
@@ -393,7 +357,7 @@ def test_a_full_disk_is_said_with_exit_2_and_the_run_goes_on_once_there_is_space
     out, (soft, hard) = quick / f"full{limit}", resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
     try:
-        full = in_process.heavytop(*command(quick / "quick.toml", "--out", str(out), "--save-every", "0")[3:])
+        full = in_process.heavytop(*command(quick, out, "--save-every", "0"))
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert full.returncode == 2
@@ -406,12 +370,9 @@ def test_a_full_disk_is_said_with_exit_2_and_the_run_goes_on_once_there_is_space
 
 def test_sigterm_ends_a_run_with_exit_143_and_it_goes_on(quick: Path) -> None:
     out = quick / "terminated"
-    process = subprocess.Popen(
-        command(quick / "quick.toml", "--out", str(out), "--save-every", "0"),
-        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    while process.poll() is None and not list(out.glob("row-*.partial")):
-        time.sleep(0.001)
+    line = [sys.executable, "-m", "heavytop", *command(quick, out, "--save-every", "0")]
+    process = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    wait_until(lambda: process.poll() is not None or list(out.glob("row-*.partial")), 60, nap=0.001)
     process.send_signal(signal.SIGTERM)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 143
@@ -426,11 +387,8 @@ def test_sigterm_ends_a_run_with_exit_143_and_it_goes_on(quick: Path) -> None:
 
 
 def test_each_row_of_a_finished_run_is_read_from_the_disk_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "plan.toml").write_text(
-        'name = "tiny"\n[[measure]]\nkind = "homoclinic"\ncases = ["delone"]\nprecisions = ["double", "extended"]\n'
-        'samples = 2\n[[measure]]\nkind = "drift"\ncases = ["euler"]\n'
-        'runs = [{ precision = "double", horizon = "2", samples = 2 }]\n'
-    )
+    escapes = '[[measure]]\nkind = "homoclinic"\ncases = ["delone"]\nprecisions = ["double", "extended"]\nsamples = 2\n'
+    plan = plan_file(tmp_path, HEAD + escapes + drift("euler"))
     read: list[int] = []
     rows = Checkpoint.rows
     monkeypatch.setattr(Checkpoint, "rows", lambda self, indices: (read.extend(indices), rows(self, indices))[1])
@@ -443,7 +401,7 @@ def test_each_row_of_a_finished_run_is_read_from_the_disk_once(tmp_path: Path, m
         return opens(file, *given, **more)
 
     monkeypatch.setattr(io, "open", counted)
-    run = prepare(str(tmp_path / "plan.toml"), tmp_path / "out", workers=1)
+    run = prepare(plan, tmp_path / "out", workers=1)
     assert run.measure().good
     assert opened.count(str(tmp_path / "out" / "rows.jsonl")) == 2  # one adds rows, the other reads them
     assert str(tmp_path / "out" / "report.json") not in opened

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from random import Random
+from time import monotonic, sleep
 from typing import Any
 
 from flint import fmpq
@@ -20,6 +23,16 @@ from heavytop.precision import exact
 from heavytop.top.equations import HEAVY_GYROSTAT, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 
+TOP = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
+START = State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
+DATA = {
+    "inertia": "3,2,1",
+    "weight": "1",
+    "centre": "1/2,1/3,1/5",
+    "omega": "1/10,2/5,9/10",
+    "gamma": "3/5,0,4/5",
+}
+"""The same motion in the words of the command line."""
 VECTORS = json.loads((Path(__file__).parents[1] / "data" / "vectors.json").read_text("utf-8"))
 
 
@@ -121,3 +134,30 @@ def named_peers(folder: Path, peers: Mapping[str, str], *lines: str) -> None:
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")
     named = (f"mine:{name} = {target}" for name, target in peers.items())
     (info / "entry_points.txt").write_text("\n".join(["[heavytop.peers]", *named, *lines]))
+
+
+def options(data: Mapping[str, str] = DATA, **changes: str) -> list[str]:
+    """These words of the command line as its options."""
+    return [part for name, value in {**data, **changes}.items() for part in (f"--{name}", value)]
+
+
+def python(*words: object, **more: Any) -> subprocess.CompletedProcess[str]:
+    """Python with these arguments in a process of its own, and what it printed."""
+    line = [sys.executable, *map(str, words)]
+    return subprocess.run(line, capture_output=True, text=True, timeout=300, check=False, **more)
+
+
+def wait_until(condition: Callable[[], object], seconds: float = 20, nap: float = 0.05) -> bool:
+    """Whether a condition came true within so many seconds."""
+    end = monotonic() + seconds
+    while not (met := condition()) and monotonic() < end:
+        sleep(nap)
+    return bool(met)
+
+
+def is_running(process: int) -> bool:
+    """Whether a process runs: one that was killed may wait for its parent to notice."""
+    try:
+        return " Z " not in Path(f"/proc/{process}/stat").read_text("utf-8")
+    except OSError:
+        return False

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterable
 from functools import partial
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -39,6 +42,27 @@ load = partial(_plan.load, kinds=KINDS)
 expand = _plan.expand
 plan_of = partial(_plan.of_document, kinds=KINDS)
 read_plan = partial(_plan.read, kinds=KINDS)
+
+
+def plan_file(folder: Path, text: str) -> str:
+    """The path of a plan of this text, written into a folder."""
+    (folder / "plan.toml").write_text(text, "utf-8")
+    return str(folder / "plan.toml")
+
+
+def tasks_of(folder: Path, text: str) -> Any:
+    """The tasks of a plan of this text, written into a folder."""
+    return expand(load(plan_file(folder, text))[0])
+
+
+def drift(*cases: str, runs: Iterable[tuple[str, str, int]] = (("double", "2", 3),), **more: object) -> str:
+    """A table of a plan in TOML: the drift of cases in runs of a precision, a horizon and so many samples each."""
+    each = ", ".join(f'{{ precision = "{p}", horizon = "{end}", samples = {count} }}' for p, end, count in runs)
+    keys = {"kind": "drift", "cases": cases} | more
+    lines = [f"{key} = {json.dumps(value)}" for key, value in keys.items()]
+    return "\n".join(["[[measure]]", *lines, f"runs = [{each}]"]) + "\n"
+
+
 store = SimpleNamespace(
     read=partial(_store.read, kinds=KINDS),
     read_brief=partial(_store.read_brief, kinds=KINDS),
