@@ -28,7 +28,6 @@ pytestmark = pytest.mark.slow
 
 VALIDATION = Path(__file__).parents[2] / "validation"
 IDENTITY = {"plan name": "tiny", "heavytop": "0.1.0"}
-HEAD = 'name = "tiny"\n'
 
 
 def row(name: str) -> Row:
@@ -71,7 +70,7 @@ class Notes(Saved):
 def tasks(tmp_path_factory: pytest.TempPathFactory):
     short = drift("kovalevskaya", "gyrostat", runs=[("extended", "4", 12)])
     long = drift("euler", "lagrange", runs=[("double", "60", 60), ("quad", "2", 12)])
-    return tasks_of(tmp_path_factory.mktemp("plan"), HEAD + long + short)
+    return tasks_of(tmp_path_factory.mktemp("plan"), long + short)
 
 
 @pytest.mark.parametrize("index", range(6))
@@ -174,7 +173,7 @@ def forged(content: object, path: tuple, value: object) -> object:
 
 @pytest.mark.parametrize("which", ["heyoka", "multiword"])
 def test_a_forged_place_with_its_checksum_is_measured_from_the_beginning(tmp_path: Path, which: str) -> None:
-    (task,) = tasks_of(tmp_path, HEAD + drift("euler", integrator=which, runs=[("double", "6", 4)]))
+    (task,) = tasks_of(tmp_path, drift("euler", integrator=which, runs=[("double", "6", 4)]))
     notes = Notes(None, 2)
     expected = measured_again(task, notes)
     place = msgspec.json.decode(notes.notes[0])
@@ -205,7 +204,7 @@ def measured_again(task, saved: Saved) -> bytes:
 
 
 def test_a_forged_row_with_its_checksum_is_refused_before_anything_is_measured(tmp_path: Path) -> None:
-    file = plan_file(tmp_path, HEAD + drift("euler", "lagrange", "gyrostat"))
+    file = plan_file(tmp_path, drift("euler", "lagrange", "gyrostat"))
     out, heard = tmp_path / "out", []
 
     def stop(task: object) -> None:
@@ -326,7 +325,7 @@ def test_a_streamed_report_is_the_one_written_at_once_a_row_a_line(tmp_path: Pat
 
 
 def test_a_kill_at_every_call_that_changes_the_disk_changes_nothing(tmp_path: Path) -> None:
-    plan = plan_file(tmp_path, HEAD + drift("euler", "lagrange", runs=[("double", "2", 2)]))
+    plan = plan_file(tmp_path, drift("euler", "lagrange", runs=[("double", "2", 2)]))
     done = python(VALIDATION / "killed_everywhere.py", plan, tmp_path / "out")
     assert done.returncode == 0, done.stderr
     assert int(done.stdout) > 15
@@ -339,7 +338,7 @@ def command(folder: Path, out: Path, *options: str) -> list[str]:
 @pytest.fixture(scope="module")
 def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("quick")
-    plan_file(folder, HEAD + drift("euler", runs=[("double", "20", 40), ("quad", "2", 40)]))
+    plan_file(folder, drift("euler", runs=[("double", "20", 40), ("quad", "2", 40)]))
     assert in_process.heavytop(*command(folder, folder / "whole")).returncode == 0
     return folder
 
@@ -388,7 +387,7 @@ def test_sigterm_ends_a_run_with_exit_143_and_it_goes_on(quick: Path) -> None:
 
 def test_each_row_of_a_finished_run_is_read_from_the_disk_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     escapes = '[[measure]]\nkind = "homoclinic"\ncases = ["delone"]\nprecisions = ["double", "extended"]\nsamples = 2\n'
-    plan = plan_file(tmp_path, HEAD + escapes + drift("euler"))
+    plan = plan_file(tmp_path, escapes + drift("euler"))
     read: list[int] = []
     rows = Checkpoint.rows
     monkeypatch.setattr(Checkpoint, "rows", lambda self, indices: (read.extend(indices), rows(self, indices))[1])

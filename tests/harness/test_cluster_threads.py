@@ -7,14 +7,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from support.reports import expand, load, rows
-
-PLAN = """name = "threads"
-[[measure]]
-kind = "drift"
-cases = ["euler", "gyrostat", "pendulum", "kovalevskaya"]
-runs = [{ precision = "double", horizon = "20", samples = 20 }, { precision = "extended", horizon = "9", samples = 9 }]
-"""
+from support.reports import drift, rows, tasks_of
 
 
 @pytest.fixture
@@ -33,9 +26,8 @@ def address() -> Iterator[str]:
 @pytest.mark.slow
 @pytest.mark.filterwarnings("default")
 def test_a_worker_of_four_threads_gives_the_rows_of_one_process(tmp_path: Path, address: str) -> None:
-    file = tmp_path / "threads.toml"
-    file.write_text(PLAN)
-    tasks = expand(load(str(file))[0])
+    cases, runs = ("euler", "gyrostat", "pendulum", "kovalevskaya"), [("double", "20", 20), ("extended", "9", 9)]
+    tasks = tasks_of(tmp_path, drift(*cases, runs=runs))
 
     def measured(scheduler: str | None) -> list:
         found = dict(rows(tasks, 1, scheduler))

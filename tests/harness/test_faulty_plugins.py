@@ -16,7 +16,7 @@ from heavytop.errors import HeavyTopError
 from heavytop.features.kinds import KINDS
 from heavytop.harness.plan import read
 from support.midpoint import MIDPOINT
-from support.reports import rows
+from support.reports import drift, plan_file, rows
 
 CASE = CASES["euler"]
 HEAD = """
@@ -117,10 +117,8 @@ def test_what_destroys_modules_is_a_failed_row_and_the_others_have_a_process_of_
     (tmp_path / "tears.py").write_text(HEAD + TEARS + "solve = right\n")
     (tmp_path / "mine.py").write_text(HEAD + "solve = right\n")
     names = [f"{name}.py:solve" for name in ("tears", "mine")]
-    table = '[[measure]]\nkind = "drift"\ncases = ["euler"]\nintegrator = "{}"\n'
-    runs = 'noise = false\nruns = [{ precision = "double", horizon = "2", samples = 4 }]\n'
-    head = f'name = "p"\nrow_timeout = "60"\nintegrators = {[*names]}\n'
-    (tmp_path / "plan.toml").write_text(head + "".join(table.format(name) + runs for name in (*names, "heyoka")))
-    found = {row.integrator: row for _, row in rows(read(str(tmp_path / "plan.toml"), KINDS)[2], 1)}
+    tables = "".join(drift("euler", integrator=name, noise=False) for name in (*names, "heyoka"))
+    plan = plan_file(tmp_path, f'row_timeout = "60"\nintegrators = {names}\n{tables}')
+    found = {row.integrator: row for _, row in rows(read(plan, KINDS)[2], 1)}
     assert [found[name].outcome for name in (*names, "heyoka")] == ["failed", "success", "success"]
     assert "measuring tears.py:solve failed: PicklingError" in found["tears.py:solve"].reference.reason

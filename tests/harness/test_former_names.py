@@ -19,37 +19,25 @@ from heavytop.integrate.registry import command_of, named
 from heavytop.report.compare.noise import Policy
 from heavytop.report.store.store import DIGEST, FILE
 from support import in_process
-from support.reports import compare, plan_of, read_plan, store
+from support.helpers import START, TOP
+from support.helpers import options as words
+from support.reports import compare, drift, plan_of, read_plan, store
 
 pytestmark = pytest.mark.slow
 
-TOP = ht.HeavyTop(inertia=(3, 2, 1), weight=1, centre=("1/2", "1/3", "1/5"))
-START = ht.State(omega=("1/10", "2/5", "9/10"), gamma=("3/5", 0, "4/5"))
-PLAN = """name = "tiny"
-[[measure]]
-kind = "drift"
-cases = ["euler"]
-integrator = "NAME"
-runs = [{ precision = "double", horizon = "2", samples = 4 }]
-[[measure]]
-kind = "work_precision"
-cases = ["euler"]
-horizon = "1"
-ladders = [{ integrator = "NAME", tolerances = ["1e-9"] }]
-"""
-
 
 def plan(folder: Path, name: str) -> str:
+    work = '[[measure]]\nkind = "work_precision"\ncases = ["euler"]\nhorizon = "1"\nladders = [{ integrator = '
     file = folder / f"{name}.toml"
-    file.write_text(PLAN.replace("NAME", name), "utf-8")
+    tables = f'{drift("euler", integrator=name)}{work}"{name}", tolerances = ["1e-9"] }}]\n'
+    file.write_text(f'name = "tiny"\n{tables}', "utf-8")
     return str(file)
 
 
 def as_before(text: str) -> str:
     """A report or a checkpoint as it was written when the name was words; method, flags and numbers as they are."""
-    for was, now in (("multiword", "words"),):
-        for key in ('"integrator":"{}', '"name":"{}"', '"measured":"computed: {} in'):
-            text = text.replace(key.format(was), key.format(now))
+    for key in ('"integrator":"{}', '"name":"{}"', '"measured":"computed: {} in'):
+        text = text.replace(key.format("multiword"), key.format("words"))
     return text
 
 
@@ -142,8 +130,7 @@ def test_the_name_of_before_is_nobody_elses(tmp_path: Path) -> None:
 
 
 def test_the_command_line_takes_it_with_one_line_of_notice(tmp_path: Path) -> None:
-    motion = "--inertia 3,2,1 --weight 1 --centre 0,0,1 --omega 1,2,3 --gamma 0,0,1 --times 1 --json"
-    found = in_process.heavytop("propagate", *motion.split(), "--integrator", "words")
+    found = in_process.heavytop("propagate", *words(times="1", integrator="words"), "--json")
     assert json.loads(found.stdout)["integrator"] == "multiword"
     assert found.stderr == "heavytop: note: the integrator words is called multiword now\n"
     run = in_process.heavytop("run", "--plan", plan(tmp_path, "words"), "--workers", 1, "--out", tmp_path / "out")

@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
-from time import monotonic, sleep
 
 import pytest
 
@@ -14,6 +13,7 @@ from heavytop.errors import NoSuchFunction
 from heavytop.harness import integrator_check
 from heavytop.harness.integrator_check import check
 from heavytop.integrate.registry import named
+from support.helpers import is_running, wait_until
 
 INTEGRATOR = '''
 import os, time
@@ -93,38 +93,23 @@ def test_the_check_ends_where_a_forked_process_is_left_behind(tmp_path: Path) ->
     (tmp_path / "mine.py").write_text(INTEGRATOR.replace("FAULT", fault))
     found = check(named(f"{tmp_path / 'mine.py'}:solve"))
     assert not [each for each in found if each.verdict == "violated"]
-    left, wait = (tmp_path / "left").read_text().split(), monotonic() + 20
-    while any(alive(int(each)) for each in left) and monotonic() < wait:
-        sleep(0.05)
-    assert not any(alive(int(each)) for each in left)
+    left = [int(each) for each in (tmp_path / "left").read_text().split()]
+    assert wait_until(lambda: not any(map(is_running, left)))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGTERM])
-def test_a_check_that_is_stopped_says_nothing_and_leaves_no_process(number: signal.Signals, tmp_path: Path) -> None:
+def test_a_check_that_is_stopped_says_nothing_and_leaves_no_process(tmp_path: Path) -> None:
     """The processes that clean up behind others hold standard error until they end."""
     fault = f"open({str(tmp_path / 'began')!r}, 'w').write(str(os.getpid())); time.sleep(600)"
     (tmp_path / "mine.py").write_text(INTEGRATOR.replace("FAULT", fault))
     command = [sys.executable, "-m", "heavytop", "check-integrator", str(tmp_path / "mine.py:solve")]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    began, wait = tmp_path / "began", monotonic() + 60
-    while not (began.exists() and began.read_text()) and monotonic() < wait:
-        sleep(0.05)
-    process.send_signal(number)
+    began = tmp_path / "began"
+    wait_until(lambda: began.exists() and began.read_text(), 60)
+    process.terminate()
     assert process.communicate(timeout=60) == ("", "")
-    assert process.returncode in (-number, 128 + number)
-    wait = monotonic() + 20
-    while alive(int(began.read_text())) and monotonic() < wait:
-        sleep(0.05)
-    assert not alive(int(began.read_text()))
-
-
-def alive(process: int) -> bool:
-    """Whether it runs: one that was killed may wait for its parent to notice."""
-    try:
-        return " Z " not in Path(f"/proc/{process}/stat").read_text()
-    except OSError:
-        return False
+    assert process.returncode in (-signal.SIGTERM, 128 + signal.SIGTERM)
+    assert wait_until(lambda: not is_running(int(began.read_text())))
 
 
 def test_an_attitude_that_is_lost_later_is_seen(tmp_path: Path) -> None:

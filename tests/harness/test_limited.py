@@ -9,7 +9,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
-from time import monotonic, sleep
+from time import sleep
 
 import msgspec
 import pytest
@@ -24,10 +24,10 @@ from heavytop.harness.plan import read
 from heavytop.harness.rows import measure
 from heavytop.records import Row
 from heavytop.report.compare.noise import Policy
-from support.helpers import without_progress
+from support.helpers import START, TOP, is_running, wait_until, without_progress
 from support.in_process import heavytop
 from support.midpoint import MIDPOINT
-from support.reports import all_good, compare, failed_row, rows
+from support.reports import all_good, compare, drift, failed_row, plan_file, rows
 
 PROGRAM = Path(__file__).parents[1] / "support" / "faulty_program.py"
 MODULE = """
@@ -74,20 +74,13 @@ name = "forks"
 command = ["{python}", "{program}", "forks"]
 setting = "step"
 """
-TABLE = """[[measure]]
-kind = "drift"
-cases = ["euler"]
-integrator = "{name}"
-runs = [{{ precision = "{precision}", horizon = "2", samples = 4 }}]
-"""
 
 
-def plan(folder: Path, *names: str, precision: str = "double") -> Path:
+def plan(folder: Path, *names: str, precision: str = "double", cases: tuple[str, ...] = ("euler",)) -> Path:
     (folder / "mine.py").write_text(MODULE)
     head = PLAN.format(python=sys.executable, program=PROGRAM)
-    tables = [TABLE.format(name=name, precision=precision) for name in names]
-    (folder / "plan.toml").write_text(head + "".join(tables))
-    return folder / "plan.toml"
+    tables = [drift(*cases, integrator=name, runs=[(precision, "2", 4)]) for name in names]
+    return Path(plan_file(folder, head + "".join(tables)))
 
 
 def running(*words: str) -> list[str]:
@@ -103,18 +96,7 @@ def running(*words: str) -> list[str]:
 
 
 def gone(*words: str) -> bool:
-    end = monotonic() + 20
-    while running(*words) and monotonic() < end:
-        sleep(0.05)
-    return not running(*words)
-
-
-def ended(process: int) -> bool:
-    """Whether it has ended, and the system's first process has taken note of that."""
-    end = monotonic() + 20
-    while (there := Path(f"/proc/{process}").exists()) and monotonic() < end:
-        sleep(0.05)
-    return not there
+    return wait_until(lambda: not running(*words))
 
 
 @pytest.mark.slow
@@ -134,7 +116,7 @@ def test_rows_that_do_not_end_are_ended_and_all_others_are_measured(tmp_path: Pa
     assert report["environment"]["integrators"] == {"silent": "faulty 1.2"}
     for words in ((str(PROGRAM),), ("sleep", "987")):
         assert gone(*words)
-    assert ended(int((tmp_path / "left").read_text()))
+    assert wait_until(lambda: not is_running(int((tmp_path / "left").read_text())))
 
 
 @pytest.mark.slow
@@ -145,9 +127,7 @@ def test_whatever_ends_a_run_ends_what_it_started(tmp_path: Path, end: int) -> N
     with subprocess.Popen(
         [*line, "--workers", "2", "--row-timeout", "100"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     ) as parent:
-        wait = monotonic() + 60
-        while not (running(str(PROGRAM), "silent") and running("sleep", "987")) and monotonic() < wait:
-            sleep(0.05)
+        wait_until(lambda: running(str(PROGRAM), "silent") and running("sleep", "987"), 60)
         os.kill(parent.pid, end)
         said = parent.communicate(timeout=30)[1]  # its standard error ends with the last process that holds it
     assert parent.returncode == (130 if end == signal.SIGINT else -9)
@@ -260,37 +240,23 @@ def solved(given):
 
 @pytest.mark.slow
 def test_a_callable_is_an_integrator_without_a_package(tmp_path: Path) -> None:
-    top = ht.HeavyTop((3, 2, 1), 1, (0, 0, "1/2"))
-    start = ht.State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
     local = lambda given: solved(given)  # noqa: E731
     for given, name in ((solved, "test_limited.py:solved"), (local, "")):
-        run = ht.propagate(top, start, [1, 2], integrator=given)
+        run = ht.propagate(TOP, START, [1, 2], integrator=given)
         assert run.outcome is ht.Outcome.SUCCESS
         assert (run.to_numpy()[1] == [0.1, 0.4, 0.9, 0.6, 0, 0.8]).all()
         assert not name or run.integrator == name
-    file = tmp_path / "plan.toml"
-    file.write_text('name = "p"\n' + TABLE.format(name="heyoka", precision="double"))
+    file = plan_file(tmp_path, drift("euler"))
     report = ht.run(file, out=tmp_path / "out", integrator=local, workers=1)
     assert [row.outcome for row in report.rows] == ["success", "success"]
     for bad in (lambda: 0, lambda a, b: 0, 3, int):
         with pytest.raises(InputError):
-            ht.propagate(top, start, [1], integrator=bad)
-
-
-ROWS = """
-[[measure]]
-kind = "drift"
-cases = ["euler", "lagrange", "pendulum", "kovalevskaya"]
-integrator = "mine.py:sleeps"
-runs = [{ precision = "double", horizon = "2", samples = 4 }]
-"""
+            ht.propagate(TOP, START, [1], integrator=bad)
 
 
 def test_an_integrator_that_ran_out_of_time_twice_is_not_asked_a_third_time(tmp_path: Path) -> None:
-    file = plan(tmp_path)
-    file.write_text(file.read_text() + ROWS)
-    tasks = read(str(file), KINDS)[2]
-    found = dict(rows(tasks, 2, row_timeout=1.0))
+    file = plan(tmp_path, "mine.py:sleeps", cases=("euler", "lagrange", "pendulum", "kovalevskaya"))
+    found = dict(rows(read(str(file), KINDS)[2], 2, row_timeout=1.0))
     outcomes = sorted(row.outcome for row in found.values())
     under_way = outcomes.count("out_of_time") - 2
     assert 0 <= under_way < 2

@@ -11,7 +11,7 @@ from heavytop.cases import CASES, case
 from heavytop.errors import InputError
 from heavytop.harness import BUILT_IN
 from heavytop.harness.plan import log_spaced, warnings
-from support.reports import expand, load
+from support.reports import drift, expand, load, plan_file, tasks_of
 from support.reports import plan_of as plan_from
 from support.reports import read_plan as read
 
@@ -32,12 +32,6 @@ GROWTH = (
     "{ precision = 'double', horizon = '10', tolerance = '1e-3' },\n"
     "{ precision = 'double', horizon = '10', tolerance = '1.0e-3' },\n]\n"
 )
-
-
-def plan_of(tmp_path: Path, text: str):
-    file = tmp_path / "plan.toml"
-    file.write_text(text, "utf-8")
-    return expand(load(str(file))[0])
 
 
 @pytest.mark.slow
@@ -95,53 +89,47 @@ def test_the_asymptotic_case_tends_to_its_saddle_at_its_rate() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("name = 'x'\nmeasure = []", "measures nothing"),
-        (f"name = 'x'\nsurprise = 1\n{MEASURE}", "unknown field `surprise`"),
-        (f"name = 'x'\n{MEASURE}extra = 1\n", "unknown field `extra`"),
-        (f"name = 'x'\n{AUDIT}system = 'gyrostat'", "kind = 'audit' has claims, systems"),
-        (f"name = 'x'\n{AUDIT}systems = 'gyrostat'", "measure[0].systems has to be a list, and is text"),
-        (f"name = 'x'\n{AUDIT}systems = ['wheel']", "Unknown system 'wheel'"),
-        (f"name = 'x'\n{AUDIT}systems = ['heavy_gyrostat']", "The paper says nothing about heavy_gyrostat"),
-        (f"name = 'x'\n{CARRIED}systems = ['gyrostat']", "sretensky-gyrostat is about heavy_gyrostat, and systems"),
-        (f"name = 'x'\n{MEASURE.replace('drift', 'drifts')}", "drifts"),
-        (f"name = 'x'\n{MEASURE.replace('euler', 'oiler')}", "Unknown case 'oiler'.   Did you mean euler?"),
-        (f"name = 'x'\n{MEASURE.replace('double', 'float')}", "Unknown precision 'float'"),
-        (f"name = 'x'\n{MEASURE.replace('10', '-10')}", "positive"),
-        (f"name = 'x'\n{MEASURE.replace('10', 'nan')}", "not a finite number"),
-        (f"name = 'x'\n{MEASURE.replace(' }', ', samples = 0 }')}", "samples must be from 1"),
-        (f"name = 'x'\n{MEASURE.replace(' }', ', samples = 1.5 }')}", "has to be an integer"),
-        (f"name = 'x'\n{MEASURE}{MEASURE}", "twice"),
-        (f"name = 'x'\n{TOP}{TOP}{MEASURE}", "two tops 'mine'"),
-        (f"name = 'x'\n{TOP}{MEASURE}", "does not measure mine"),
-        (f"name = 'x'\n{TOP.replace('mine', 'my top')}{MEASURE}", "The top's name 'my top' is not letters, digits"),
-        (f"name = 'x'\n{MEASURE.replace('10', '1e-400')}", "drift euler double: 1E-403 is outside the exponent range"),
-        (f"name = 'x'\n{WORK}", "heyoka tolerance=0.001 double twice, also as work_precision euler/T=10 heyoka tol"),
-        (
-            f"name = 'x'\n{ONE}{ONE.replace('10', '1e1')}",
-            "twice, also as work_precision euler/T=10 heyoka tolerance=1e-3",
-        ),
-        (
-            f"name = 'x'\n{GROWTH}",
-            "growth euler heyoka tolerance 1.0e-3 double twice, also as growth euler heyoka tolerance 1e-3 double",
-        ),
-        ("name = 'x'\n[[measure]", "not valid"),
-        ("", "name"),
+        ("measure = []", "measures nothing"),
+        (f"surprise = 1\n{MEASURE}", "unknown field `surprise`"),
+        (f"{MEASURE}extra = 1\n", "unknown field `extra`"),
+        (f"{AUDIT}system = 'gyrostat'", "kind = 'audit' has claims, systems"),
+        (f"{AUDIT}systems = 'gyrostat'", "measure[0].systems has to be a list, and is text"),
+        (f"{AUDIT}systems = ['wheel']", "Unknown system 'wheel'"),
+        (f"{AUDIT}systems = ['heavy_gyrostat']", "The paper says nothing about heavy_gyrostat"),
+        (f"{CARRIED}systems = ['gyrostat']", "sretensky-gyrostat is about heavy_gyrostat, and systems"),
+        (MEASURE.replace("euler", "oiler"), "Unknown case 'oiler'.   Did you mean euler?"),
+        (MEASURE.replace("double", "float"), "Unknown precision 'float'"),
+        (MEASURE.replace("10", "-10"), "positive"),
+        (MEASURE.replace("10", "nan"), "not a finite number"),
+        (MEASURE.replace(" }", ", samples = 0 }"), "samples must be from 1"),
+        (MEASURE.replace(" }", ", samples = 1.5 }"), "has to be an integer"),
+        (f"{MEASURE}{MEASURE}", "twice"),
+        (f"{TOP}{TOP}{MEASURE}", "two tops 'mine'"),
+        (f"{TOP}{MEASURE}", "does not measure mine"),
+        (f"{TOP.replace('mine', 'my top')}{MEASURE}", "The top's name 'my top' is not letters, digits"),
+        (f"{TOP.replace('3/5', '2/5')}{MEASURE}", "not a unit vector"),
+        (f"{TOP.replace('mine', 'euler')}{MEASURE}", "built-in"),
+        (MEASURE.replace("10", "1e-400"), "drift euler double: 1E-403 is outside the exponent range"),
+        (WORK, "heyoka tolerance=0.001 double twice, also as work_precision euler/T=10 heyoka tol"),
+        (f"{ONE}{ONE.replace('10', '1e1')}", "twice, also as work_precision euler/T=10 heyoka tolerance=1e-3"),
+        (GROWTH, "tolerance 1.0e-3 double twice, also as growth euler heyoka tolerance 1e-3 double"),
+        ("[[measure]", "not valid"),
         (f"name = '../evil'\n{MEASURE}", "letters, digits"),
-        (f"name = 'x'\n{MEASURE.replace('10', '1e400')}", "too large"),
+        (MEASURE.replace("10", "1e400"), "too large"),
         ("name = " + "[" * 100000, "too deeply"),
-        ("name='x'\n[[measure]]\nkind='claim_model'\ncases=['euler']\ntimes=['1']", "Nothing is claimed"),
-        ("name='x'\n[[measure]]\nkind='homoclinic'\ncases=['euler']\nprecisions=['double']", "not homoclinic"),
+        ("[[measure]]\nkind='claim_model'\ncases=['euler']\ntimes=['1']", "Nothing is claimed"),
+        ("[[measure]]\nkind='homoclinic'\ncases=['euler']\nprecisions=['double']", "not homoclinic"),
     ],
 )
 def test_what_is_impossible_is_refused_and_named(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(InputError) as error:
-        plan_of(tmp_path, text)
+        tasks_of(tmp_path, text)
     assert message in str(error.value).replace("\n", " ")
 
 
 def test_claims_are_audited_as_motions_of_their_own_system_unless_others_are_named(tmp_path: Path) -> None:
     def systems(text: str) -> list[tuple[str, str]]:
-        return [(task.key.case, task.key.system) for task in plan_of(tmp_path, f"name = 'x'\n{text}")]
+        return [(task.key.case, task.key.system) for task in tasks_of(tmp_path, text)]
 
     own = [("sretensky-gyrostat", "heavy_gyrostat")]
     assert systems(CARRIED) == systems(f"{CARRIED}systems = ['heavy_top', 'heavy_gyrostat']") == own
@@ -151,13 +139,9 @@ def test_claims_are_audited_as_motions_of_their_own_system_unless_others_are_nam
 
 
 def test_a_top_of_one_s_own_is_measured_under_its_name(tmp_path: Path) -> None:
-    (task,) = plan_of(tmp_path, f"name = 'x'\n{TOP}{MEASURE.replace('euler', 'mine')}")
+    (task,) = tasks_of(tmp_path, f"{TOP}{drift('mine')}")
     assert task.title == "mine"
     assert task.case.start.omega[2] == Fraction(-2, 3)
-    with pytest.raises(InputError, match="not a unit vector"):
-        plan_of(tmp_path, f"name = 'x'\n{TOP.replace('3/5', '2/5')}{MEASURE}")
-    with pytest.raises(InputError, match="built-in"):
-        plan_of(tmp_path, f"name = 'x'\n{TOP.replace('mine', 'euler')}{MEASURE}")
 
 
 def test_numbers_of_a_plan_are_those_that_it_writes_down(tmp_path: Path) -> None:
@@ -171,7 +155,7 @@ about = "pivot"
 omega = [0, -1, 2e-1]
 quaternion = [1, 0, 0, 0]
 """
-    (task,) = plan_of(tmp_path, f"name = 'x'\n{body}{MEASURE.replace('euler', 'mine')}".replace('"10"', "10"))
+    (task,) = tasks_of(tmp_path, f"{body}{MEASURE.replace('euler', 'mine')}".replace('"10"', "10"))
     assert task.key.horizon == "10"
     assert task.case.body.mass == 15
     assert task.case.body.gravity == Fraction("9.80665000000000000000001")
@@ -184,10 +168,13 @@ quaternion = [1, 0, 0, 0]
         ("1" * 5000, "not"),
     ):
         with pytest.raises(InputError, match=said):
-            plan_of(tmp_path, f"name = 'x'\n{body.replace('= 15', f'= {wrong}')}{MEASURE.replace('euler', 'mine')}")
+            tasks_of(tmp_path, f"{body.replace('= 15', f'= {wrong}')}{drift('mine')}")
 
 
-def test_unknown_plans_are_refused() -> None:
+def test_unknown_plans_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "empty.toml").touch()
+    with pytest.raises(InputError, match="lacks the key name"):
+        load(str(tmp_path / "empty.toml"))
     with pytest.raises(InputError, match=r"Unknown plan 'smoek'.*\n.*Did you mean smoke"):
         load("smoek")
     with pytest.raises(InputError, match="cannot be read"):
@@ -202,31 +189,15 @@ def test_log_spaced_indices_start_at_1_and_end_at_the_count() -> None:
     assert 20 <= len(picked) <= 26
 
 
-OWN = """name = "own"
-[[top]]
-name = "odd"
-inertia = ["3", "2", "1"]
-weight = "1"
-centre = ["0", "0", "1"]
-omega = ["0", "0", "1"]
-gamma = ["1", "1", "0"]
-[[measure]]
-kind = "drift"
-cases = ["odd"]
-runs = [{ precision = "double", horizon = "1" }]
-"""
-
-
 def test_a_gamma_that_is_none_names_file_and_top_and_a_remedy_that_run_has(tmp_path: Path) -> None:
-    file = tmp_path / "own.toml"
-    file.write_text(OWN)
+    text = TOP.replace('["3/5", "0", "4/5"]', '["1", "1", "0"]') + drift("mine")
     with pytest.raises(InputError) as caught:
-        read(str(file))
-    assert caught.value.cause == f"{file}: The plan's top 'odd': gamma is not a unit vector: |gamma|^2 - 1 = 1."
+        tasks_of(tmp_path, text)
+    file = tmp_path / "plan.toml"
+    assert caught.value.cause == f"{file}: The plan's top 'mine': gamma is not a unit vector: |gamma|^2 - 1 = 1."
     assert "--normalize" not in caught.value.remedy
     near = re.search(r"near this one is (\S+), (\S+), (\S+)\.$", caught.value.remedy)
-    file.write_text(OWN.replace('["1", "1", "0"]', str([*near.groups()]).replace("'", '"')))
-    assert len(read(str(file))[2]) == 1
+    assert len(tasks_of(tmp_path, text.replace('["1", "1", "0"]', str([*near.groups()])))) == 1
 
 
 @pytest.mark.parametrize(
@@ -236,27 +207,23 @@ def test_a_gamma_that_is_none_names_file_and_top_and_a_remedy_that_run_has(tmp_p
 def test_an_unknown_kind_is_answered_with_those_that_are_there(
     kind: str, section: str, near: str, tmp_path: Path
 ) -> None:
-    file = tmp_path / "own.toml"
-    file.write_text(f'name = "own"\nmeasure = []\n[[{section}]]\nkind = "{kind}"\n'.replace("measure = []\n[[m", "[[m"))
+    text = f'[[{section}]]\nkind = "{kind}"\n' + (drift("euler") if section == "sweep" else "")
     with pytest.raises(InputError, match=f"{section}.0.* must be one of .*; got '{kind}'; did you mean {near}"):
-        load(str(file))
+        tasks_of(tmp_path, text)
 
 
 def test_moments_that_no_body_has_are_told(tmp_path: Path) -> None:
-    file = tmp_path / "own.toml"
-    file.write_text(OWN.replace('"2", "1"]\nweight', '"2", "7"]\nweight').replace('["1", "1", "0"]', '["0", "0", "1"]'))
-    (warning,) = warnings(load(str(file))[0])
-    assert warning == "top odd: I3 = 7 exceeds the sum 5 of the other two: no rigid body has such moments."
+    file = plan_file(tmp_path, TOP.replace('"2", "1"]', '"2", "7"]') + drift("mine"))
+    (warning,) = warnings(load(file)[0])
+    assert warning == "top mine: I3 = 7 exceeds the sum 5 of the other two: no rigid body has such moments."
 
 
 @pytest.mark.parametrize("about", ["pivot", "centre of mass"])
 def test_a_tensor_about_the_other_point_is_told(about: str, tmp_path: Path) -> None:
     body = 'mass = "15"\ngravity = "9.81"\ncentre = ["0", "1", "0"]\ninertia = ["0.234375", "0.46875", "0.234375"]\n'
     start = 'omega = ["0", "150", "-4.61538"]\nquaternion = ["1", "0", "0", "0"]\n'
-    table = '[[measure]]\nkind = "drift"\ncases = ["mine"]\nruns = [{precision = "double", horizon = "1"}]\n'
-    file = tmp_path / "own.toml"
-    file.write_text(f'name = "own"\n[[top]]\nname = "mine"\n{body}about = "{about}"\n{start}{table}')
-    found = warnings(load(str(file))[0])
+    file = plan_file(tmp_path, f'[[top]]\nname = "mine"\n{body}about = "{about}"\n{start}{drift("mine")}')
+    found = warnings(load(file)[0])
     if about == "pivot":
         (text,) = found
         assert text.startswith(
@@ -276,14 +243,12 @@ def test_a_tolerance_below_eps_is_refused_before_anything_runs(
     tolerance: str, integrator: str, refused: bool, tmp_path: Path
 ) -> None:
     pytest.importorskip("sksundae")
-    file = tmp_path / "work.toml"
     schedule = ONE.replace("'heyoka'", f"'{integrator}'").replace("1e-3", tolerance)
-    file.write_text(f'name = "work"\n{schedule}')
     if refused:
         with pytest.raises(InputError, match="olerance"):
-            read(str(file))
+            read(plan_file(tmp_path, schedule))
     else:
-        assert len(read(str(file))[2]) == 1
+        assert len(tasks_of(tmp_path, schedule)) == 1
 
 
 def test_one_case_may_stand_at_several_horizons_and_each_has_a_name_of_its_own() -> None:

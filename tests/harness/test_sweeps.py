@@ -12,7 +12,7 @@ from heavytop.exact.catalogue import find
 from heavytop.features.kinds import KINDS
 from heavytop.harness.sweeps import Random
 from heavytop.precision import dot
-from support.reports import expand, load, rows
+from support.reports import drift, rows, tasks_of
 
 GRID = """[[sweep]]
 kind = "grid"
@@ -24,21 +24,12 @@ omega = [["1/10", "2/5", "9/10"], ["1", "2", "3"], ["0", "0", "1"]]
 gamma = ["3/5", "0", "4/5"]
 """
 RANDOM = '[[sweep]]\nkind = "random"\nname = "r"\nseed = 1\ncount = 3\n'
-MEASURE = """[[measure]]
-kind = "drift"
-cases = ["euler", "sweep:g", "sweep:r"]
-runs = [{ precision = "double", horizon = "2", samples = 2 }, { precision = "quad", horizon = "1", samples = 1 }]
-"""
-
-
-def plan_of(tmp_path: Path, text: str):
-    file = tmp_path / "plan.toml"
-    file.write_text(f"name = 'x'\n{text}", "utf-8")
-    return expand(load(str(file))[0])
+RUNS = [("double", "2", 2), ("quad", "1", 1)]
+MEASURE = drift("euler", "sweep:g", "sweep:r", runs=RUNS)
 
 
 def test_a_grid_is_the_cartesian_product_with_places_for_names(tmp_path: Path) -> None:
-    tasks = plan_of(tmp_path, GRID + RANDOM + MEASURE)
+    tasks = tasks_of(tmp_path, GRID + RANDOM + MEASURE)
     grid = [f"g[{i},{j}]" for i in range(2) for j in range(3)]
     names = ["euler", *grid, "r[0]", "r[1]", "r[2]"]
     assert [(t.title, t.key.precision) for t in tasks] == [(n, p) for n in names for p in ("double", "quad")]
@@ -55,7 +46,7 @@ def test_a_grid_is_the_cartesian_product_with_places_for_names(tmp_path: Path) -
 
 def test_names_that_say_more_than_the_case_keep_what_they_say(tmp_path: Path) -> None:
     work = 'kind = "work_precision"\nhorizon = "5"\nladders = [{ integrator = "heyoka", tolerances = ["1e-6"] }]\n'
-    tasks = plan_of(tmp_path, RANDOM + '[[measure]]\ncases = ["sweep:r", "euler"]\n' + work)
+    tasks = tasks_of(tmp_path, RANDOM + '[[measure]]\ncases = ["sweep:r", "euler"]\n' + work)
     assert [task.title for task in tasks] == ["r[0]/T=5", "r[1]/T=5", "r[2]/T=5", "euler/T=5"]
     assert [task.case.name for task in tasks] == ["r[0]", "r[1]", "r[2]", "euler"]
 
@@ -63,8 +54,7 @@ def test_names_that_say_more_than_the_case_keep_what_they_say(tmp_path: Path) ->
 def test_the_plan_in_the_documentation_is_one_and_every_kind_is_there(tmp_path: Path) -> None:
     text = (Path(__file__).parents[2] / "docs" / "plans.md").read_text("utf-8")
     (example,) = re.findall(r"```toml\n(.*?)```", text, re.S)
-    (tmp_path / "plan.toml").write_text(example, "utf-8")
-    tasks = expand(load(str(tmp_path / "plan.toml"))[0])
+    tasks = tasks_of(tmp_path, example)
     assert len(tasks) == 2 * (1 + 2 + 6 + 100)
     assert {"mine", "faster[1,2]", "many[99]"} <= {task.title for task in tasks}
     kinds = {kind.name for kind in KINDS.values() if kind.table is not None}
@@ -73,9 +63,8 @@ def test_the_plan_in_the_documentation_is_one_and_every_kind_is_there(tmp_path: 
 
 def test_weights_are_an_axis_too(tmp_path: Path) -> None:
     grid = GRID.replace('"3/2"\n', '["1", "2", "4"]\n')
-    tasks = plan_of(tmp_path, grid + MEASURE.replace('"euler", ', "").replace(', "sweep:r"', ""))
-    assert tasks[2 * (1 * 9 + 2 * 3 + 1)].title == "g[1,2,1]"
-    assert tasks[2 * (1 * 9 + 2 * 3 + 1)].case.top.weight == 4
+    task = tasks_of(tmp_path, grid + drift("sweep:g"))[1 * 9 + 2 * 3 + 1]
+    assert (task.title, task.case.top.weight) == ("g[1,2,1]", 4)
 
 
 @pytest.mark.parametrize("family", ["any", "euler", "lagrange", "kovalevskaya"])
@@ -109,10 +98,10 @@ def test_random_tops_depend_on_seed_and_index_alone() -> None:
 
 
 def test_a_million_rows_are_planned_without_making_them(tmp_path: Path) -> None:
-    plan = RANDOM.replace("count = 3", "count = 1_000_000") + MEASURE.replace('"sweep:g", ', "")
+    plan = RANDOM.replace("count = 3", "count = 1_000_000") + drift("euler", "sweep:r", runs=RUNS)
     tracemalloc.start()
     try:
-        tasks = plan_of(tmp_path, plan)
+        tasks = tasks_of(tmp_path, plan)
         assert len(tasks) == 2_000_002
         assert tasks[-1].title == "r[999999]"
         assert tracemalloc.get_traced_memory()[1] < 2**20
@@ -122,7 +111,7 @@ def test_a_million_rows_are_planned_without_making_them(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_swept_tasks_share_their_times_and_are_measured_under_their_names(tmp_path: Path) -> None:
-    tasks = plan_of(tmp_path, RANDOM + MEASURE.replace('"euler", "sweep:g", ', ""))
+    tasks = tasks_of(tmp_path, RANDOM + drift("sweep:r", runs=RUNS))
     assert tasks[0].times is tasks[2].times
     found = dict(rows(tasks[:2], 1, None))
     assert [found[i].identity[1:] for i in range(2)] == [("r[0]", "heyoka", ())] * 2
@@ -163,20 +152,17 @@ def test_what_is_impossible_is_refused_and_named(tmp_path: Path, old: str, new: 
     whole = GRID + RANDOM + MEASURE
     assert old in whole
     with pytest.raises(InputError) as error:
-        plan_of(tmp_path, whole.replace(old, new, 1))
+        tasks_of(tmp_path, whole.replace(old, new, 1))
     assert message in str(error.value).replace("\n", " ")
 
 
 def test_a_grid_of_one_point_and_a_sweep_where_a_claim_is_needed_are_refused(tmp_path: Path) -> None:
-    one = RANDOM.replace('"random"', '"grid"').replace("seed = 1\ncount = 3\n", "")
-    one += (
-        'inertia = ["3","2","2"]\nweight = "1"\ncentre = ["0","0","1"]\nomega = ["0","0","1"]\ngamma = ["0","0","1"]\n'
-    )
+    data = "inertia = [3, 2, 2]\nweight = 1\ncentre = [0, 0, 1]\nomega = [0, 0, 1]\ngamma = [0, 0, 1]\n"
+    one = '[[sweep]]\nkind = "grid"\nname = "r"\n' + data
     with pytest.raises(InputError, match="varies nothing"):
-        plan_of(tmp_path, one + MEASURE)
+        tasks_of(tmp_path, one + MEASURE)
     claim = '[[measure]]\nkind = "claim_model"\ncases = ["sweep:r"]\ntimes = ["1"]\n'
     with pytest.raises(InputError, match=r"Nothing is claimed about the case r\[0\]"):
-        plan_of(tmp_path, RANDOM + claim)
-    taken = '[[top]]\nname = "r[1]"\n' + one.partition('name = "r"\n')[2]
+        tasks_of(tmp_path, RANDOM + claim)
     with pytest.raises(InputError, match=r"The top's name 'r\[1\]' is not letters"):
-        plan_of(tmp_path, RANDOM + taken + MEASURE)
+        tasks_of(tmp_path, RANDOM + '[[top]]\nname = "r[1]"\n' + data + MEASURE)

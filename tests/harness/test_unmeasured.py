@@ -10,14 +10,9 @@ from heavytop.measure import truth
 from heavytop.report.compare.noise import Policy
 from support.helpers import without_progress
 from support.in_process import heavytop
-from support.reports import all_good, compare, expand, load, replace, rows, store
+from support.reports import all_good, compare, drift, plan_file, replace, rows, store, tasks_of
 
-PLAN = """name = "far"
-[[measure]]
-kind = "drift"
-cases = ["euler"]
-runs = [{ precision = "double", horizon = "5", samples = 5 }]
-"""
+PLAN = drift("euler", runs=[("double", "5", 5)])
 FAR = """[[measure]]
 kind = "claim_model"
 cases = ["ershkov-partial-2"]
@@ -33,15 +28,10 @@ directions = ["forward"]
 """
 
 
-def tasks_of(folder: Path, text: str):
-    (folder / "plan.toml").write_text(text)
-    return expand(load(str(folder / "plan.toml"))[0])
-
-
 @pytest.mark.slow
 def test_a_plan_with_rows_out_of_reach_ends_with_all_others_and_exit_3(tmp_path: Path) -> None:
-    (tmp_path / "plan.toml").write_text(PLAN + FAR)
-    done = heavytop("run", "--plan", tmp_path / "plan.toml", "--out", tmp_path / "out", "--workers", 1)
+    plan = plan_file(tmp_path, PLAN + FAR)
+    done = heavytop("run", "--plan", plan, "--out", tmp_path / "out", "--workers", 1)
     assert (done.returncode, without_progress(done.stderr)) == (3, "")
     said = " ".join(done.stdout.split())
     assert "claim_model of ershkov-partial-2/backward, claim:smooth in exact: out_of_reach" in said
@@ -85,21 +75,9 @@ def test_a_contradiction_is_the_outcome_of_its_row_alone(tmp_path: Path, monkeyp
 
 
 def test_steps_of_a_top_at_rest_are_out_of_reach(tmp_path: Path) -> None:
-    plan = """name = "rest"
-[[top]]
-name = "rest"
-inertia = ["3", "2", "1"]
-weight = "1"
-centre = ["0", "0", "1"]
-omega = ["0", "0", "0"]
-gamma = ["0", "0", "1"]
-[[measure]]
-kind = "local_error"
-cases = ["rest"]
-precisions = ["double"]
-horizon = "1"
-"""
-    ((_, row),) = rows(tasks_of(tmp_path, plan), 1, None)
+    rest = '[[top]]\nname = "rest"\ninertia = [3, 2, 1]\nweight = 1\ncentre = [0, 0, 1]\nomega = [0, 0, 0]\n'
+    steps = '[[measure]]\nkind = "local_error"\ncases = ["rest"]\nprecisions = ["double"]\nhorizon = "1"\n'
+    ((_, row),) = rows(tasks_of(tmp_path, f"{rest}gamma = [0, 0, 1]\n{steps}"), 1, None)
     assert (row.outcome, row.metrics) == ("out_of_reach", {})
     assert row.against == "nothing: rest rests, so its integrator takes no step."
 
@@ -107,7 +85,7 @@ horizon = "1"
 def test_a_peer_that_gives_up_is_no_failure_but_a_row_that_came_to_nothing_is_one(tmp_path: Path) -> None:
     schedule = '[[measure]]\nkind = "work_precision"\ncases = ["euler"]\nhorizon = "5"\n'
     schedule += 'ladders = [{ integrator = "heyoka", tolerances = ["eps"] }]\n'
-    (task,) = tasks_of(tmp_path, 'name = "work"\n' + schedule)
+    (task,) = tasks_of(tmp_path, schedule)
     row = unmeasured(task, OutOfReach("Nothing is known there."))
     assert row.identity[1:] == ("euler/T=5", "heyoka tolerance=eps", ())
     assert (row.measure, row.system, row.precision) == ("work_precision", "heavy_top", "double")
@@ -116,15 +94,8 @@ def test_a_peer_that_gives_up_is_no_failure_but_a_row_that_came_to_nothing_is_on
 
 
 def test_what_only_measuring_shows_to_be_impossible_names_the_row(tmp_path: Path) -> None:
-    sweep = """[[sweep]]
-kind = "grid"
-name = "g"
-inertia = ["3", "2", "2"]
-weight = ["1", "1e-400"]
-centre = ["0", "0", "1"]
-omega = ["0", "0", "1"]
-gamma = ["0", "0", "1"]
-"""
-    tasks = tasks_of(tmp_path, PLAN.replace("[[", f"{sweep}[[", 1).replace('"euler"', '"sweep:g"'))
+    sweep = '[[sweep]]\nkind = "grid"\nname = "g"\ninertia = ["3", "2", "2"]\nweight = ["1", "1e-400"]\n'
+    upright = "".join(f'{key} = ["0", "0", "1"]\n' for key in ("centre", "omega", "gamma"))
+    tasks = tasks_of(tmp_path, sweep + upright + drift("sweep:g"))
     with pytest.raises(InputError, match=r"^drift g\[1\] double: 1E-400 is outside the exponent range of double"):
         list(rows(tasks, 1, None))

@@ -24,29 +24,17 @@ from heavytop.errors import HeavyTopError, InputError
 from heavytop.features.kinds import KINDS
 from heavytop.harness import limited, run
 from heavytop.harness.checkpoint import Saved
-from heavytop.harness.plan import read
 from heavytop.harness.rows import Task
 from heavytop.measure.scalar import digits_kept
 from heavytop.processes import ChildContext
 from heavytop.records import SCHEMA, Report, Row
 from heavytop.report.render.terminal import brief, summary
 from heavytop.report.store.checks import contradictions
-from support.reports import rows
+from support.reports import drift, plan_file, rows, tasks_of
 
 pytestmark = pytest.mark.slow
 
-PLAN = """name = "tiny"
-[[measure]]
-kind = "drift"
-cases = ["euler", "lagrange", "pendulum"]
-runs = [{ precision = "double", horizon = "5", samples = 5 }, { precision = "double", horizon = "6", samples = 5 }]
-"""
-
-
-def tasks_of(folder: Path, text: str):
-    file = folder / "tiny.toml"
-    file.write_text(text)
-    return read(str(file), KINDS)[2]
+PLAN = drift("euler", "lagrange", "pendulum", runs=[("double", "5", 5), ("double", "6", 5)])
 
 
 @pytest.fixture(scope="module")
@@ -69,23 +57,10 @@ def measured(tasks, processes: int, scheduler: str | None = None, after_first: C
     return [found[index] for index in range(len(tasks))]
 
 
-TRUTHS = """name = "truths"
-[[measure]]
-kind = "drift"
-cases = ["generic"]
-runs = [
-    { precision = "double", horizon = "30", samples = 6 },
-    { precision = "double", horizon = "1600", samples = 16 },
-]
-[[measure]]
-kind = "growth"
-cases = ["generic"]
-runs = [{ precision = "double", horizon = "20", starts = 3, samples = 4 }]
-"""
-
-
 def test_every_kind_of_truth_is_the_same_in_one_process_and_in_two(tmp_path: Path) -> None:
-    tasks = tasks_of(tmp_path, TRUTHS)
+    growth = '[[measure]]\nkind = "growth"\ncases = ["generic"]\nruns = [{ precision = "double", horizon = "20", '
+    truths = drift("generic", runs=[("double", "30", 6), ("double", "1600", 16)]) + growth
+    tasks = tasks_of(tmp_path, f"{truths}starts = 3, samples = 4 }}]\n")
     found = [measured(tasks, processes) for processes in (1, 2)]
     # as reports are written: from rows that were read again
     one, two = (msgspec.json.decode(msgspec.json.encode(each), type=list[Row]) for each in found)
@@ -196,14 +171,13 @@ def test_processes_end_when_their_parent_is_killed_in_the_midst_of_a_row_too(tmp
         "from heavytop.harness.plan import expand, load\n"
         "from heavytop.harness.run import rows\n"
         "if __name__ == '__main__':\n"
-        f"    tasks = expand(load({str(tmp_path / 'tiny.toml')!r}, KINDS)[0])\n"
+        f"    tasks = expand(load({str(tmp_path / 'plan.toml')!r}, KINDS)[0])\n"
         "    stream = rows(tasks, KINDS, 2, None)\n"
         "    next(stream)\n"
         "    print(*(child.pid for child in active_children()), flush=True)\n"
         "    input()\n"
     )
-    endless = '[[measure]]\nkind = "drift"\ncases = ["gyrostat"]\nruns = [{ precision = "double", horizon = "1e9" }]\n'
-    (tmp_path / "tiny.toml").write_text(PLAN + endless)
+    plan_file(tmp_path, PLAN + drift("gyrostat", runs=[("double", "1e9", 100)]))
     with subprocess.Popen([sys.executable, script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as parent:
         assert len(parent.stdout.readline().split()) == 2
         parent.kill()
@@ -279,12 +253,8 @@ def test_on_a_cluster_too_rows_of_others_end_and_their_workers_live(
 ) -> None:
     (tmp_path / "mine.py").write_text(THIRD_PARTY)
     names = [f"mine.py:{name}" for name in ("good", "stuck", "dies")]
-    tables = [
-        f'[[measure]]\nkind = "drift"\ncases = ["pendulum"]\nintegrator = "{name}"\n'
-        'runs = [{ precision = "double", horizon = "1", samples = 2 }]\n'
-        for name in names
-    ]
-    theirs = tasks_of(tmp_path, f'name = "theirs"\nintegrators = {names}\n'.replace("'", '"') + "".join(tables))
+    tables = [drift("pendulum", integrator=name, runs=[("double", "1", 2)]) for name in names]
+    theirs = tasks_of(tmp_path, f"integrators = {names}\n" + "".join(tables))
     before = worker_pids()
     found = dict(run.rows([*theirs, tasks[0]], KINDS, 1, cluster, row_timeout=2.0))
     assert [found[index].outcome for index in range(4)] == ["success", "out_of_time", "failed", "success"]
