@@ -12,15 +12,9 @@ from heavytop.harness.checkpoint import Saved
 from heavytop.harness.plan import read
 from heavytop.harness.rows import measure as measured
 from heavytop.report.render.text import failed
-from support.reports import measure
+from support.reports import drift, measure, plan_file
 
-PLAN = """
-name = "mine"
-[[measure]]
-kind = "drift"
-cases = ["euler"]
-runs = [{ precision = "double", horizon = "4", samples = 8 }]
-[[measure]]
+OTHERS = """[[measure]]
 kind = "homoclinic"
 cases = ["delone"]
 precisions = ["double"]
@@ -36,7 +30,8 @@ cases = ["euler"]
 horizon = "4"
 samples = 4
 ladders = [{ integrator = "heyoka", tolerances = ["1e-6", "eps"] }, { integrator = "splitting:2", steps = ["1/9"] }]
-[[measure]]
+"""
+GROWTH = """[[measure]]
 kind = "growth"
 cases = ["euler"]
 runs = [{ precision = "double", horizon = "4", starts = 8, samples = 4, decades = 1 }]
@@ -45,8 +40,7 @@ runs = [{ precision = "double", horizon = "4", starts = 8, samples = 4, decades 
 
 @pytest.fixture
 def plan(tmp_path: Path) -> str:
-    (tmp_path / "mine.toml").write_text(PLAN)
-    return str(tmp_path / "mine.toml")
+    return plan_file(tmp_path, drift("euler", runs=[("double", "4", 8)]) + OTHERS + GROWTH)
 
 
 def labels(name: str, integrator: str = "") -> list[tuple[str, str, str]]:
@@ -79,10 +73,8 @@ def test_its_rows_are_scored_like_those_of_heyoka(plan: str, integrator: str) ->
 
 
 def test_a_format_that_it_lacks_is_unsupported_and_no_failure(tmp_path: Path) -> None:
-    (tmp_path / "quad.toml").write_text(
-        'name = "q"\n[[measure]]\nkind = "drift"\ncases = ["euler"]\nruns = [{ precision = "quad", horizon = "1" }]\n'
-    )
-    _, theirs = read(str(tmp_path / "quad.toml"), KINDS, integrator="scipy:DOP853")[2]
+    plan = plan_file(tmp_path, drift("euler", runs=[("quad", "1", 100)]))
+    _, theirs = read(plan, KINDS, integrator="scipy:DOP853")[2]
     row = measured(KINDS[theirs.key.kind], theirs, Saved())
     assert (row.outcome, row.metrics) == ("unsupported", {})
     assert row.reference.reason.startswith("scipy:DOP853 has no quad")
@@ -91,11 +83,8 @@ def test_a_format_that_it_lacks_is_unsupported_and_no_failure(tmp_path: Path) ->
 
 @pytest.mark.parametrize("integrator", ["multiword", "splitting:8"])
 def test_an_option_of_heyoka_that_it_lacks_fails_its_own_row(tmp_path: Path, integrator: str) -> None:
-    (tmp_path / "growth.toml").write_text(
-        PLAN[: PLAN.index("[[measure]]")]
-        + PLAN[PLAN.rindex("[[measure]]") :].replace("starts = 8", "starts = 8, high_accuracy = true")
-    )
-    _, theirs = read(str(tmp_path / "growth.toml"), KINDS, integrator=integrator)[2]
+    plan = plan_file(tmp_path, GROWTH.replace("starts = 8", "starts = 8, high_accuracy = true"))
+    _, theirs = read(plan, KINDS, integrator=integrator)[2]
     row = measure(theirs)
     assert (row.outcome, row.metrics) == ("failed", {})
     assert f"{integrator} has no high_accuracy" in row.reference.reason
@@ -107,13 +96,12 @@ def test_the_gate_measures_every_thing_that_a_gate_asks() -> None:
 
 
 def test_who_stands_beside_heyoka_is_another_that_is_known(plan: str, tmp_path: Path) -> None:
-    (tmp_path / "claims.toml").write_text(
-        'name = "c"\n[[measure]]\nkind = "audit"\nclaims = ["ershkov-partial"]\nsystems = ["gyrostat"]\n'
-    )
+    audit = '[[measure]]\nkind = "audit"\nclaims = ["ershkov-partial"]\nsystems = ["gyrostat"]\n'
+    (tmp_path / "claims").mkdir()
     for name, integrator, cause in (
         (plan, "heyoka", "what others are compared with"),
         (plan, "rk4", "Unknown integrator"),
-        (str(tmp_path / "claims.toml"), "multiword", "does not measure heyoka"),
+        (plan_file(tmp_path / "claims", audit), "multiword", "does not measure heyoka"),
     ):
         with pytest.raises(InputError, match=cause) as caught:
             read(name, KINDS, integrator=integrator)

@@ -16,18 +16,12 @@ from heavytop.harness.rows import data_of
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.precision import DOUBLE, exact
 from heavytop.records import Data, Law, Quantity, Row, Series
-from heavytop.report.compare.noise import Policy
-from support.reports import compare, expand, load, measure, replace, rows, store
-from support.small_reports import report, row
+from support.reports import drift, measure, replace, rows, store, tasks_of
+from support.small_reports import judged, report, row
 
 DATA = Data(("3", "2", "1/3"), "3/2", ("0", "1/5", "-1"), ("1/10", "0", "9/10"), ("3/5", "0", "-4/5"))
 NAMES = ("inertia", "weight", "centre", "omega", "gamma")
 LAW = Law("t^0.5", 16, 0.5, 0.47, 0.53, "100", "1e5", "1e-19", "1e30")
-
-
-def judged(old: Row, new: Row) -> tuple[str, str]:
-    result = compare(report(old), report(new), Policy())
-    return result.verdict, "; ".join(finding.reason for finding in result.changed)
 
 
 def changes(text: str) -> set[str]:
@@ -132,26 +126,16 @@ def test_a_series_and_a_law_are_of_the_quantity_that_they_were(part: str) -> Non
     assert judged(*two) == ("incomparable", "it says that it is another quantity")
 
 
-PLAN = """name = "own"
-[[top]]
-name = "mine"
-inertia = ["3", "2", "1"]
-weight = "1"
-centre = ["0", "0", "{centre}"]
-omega = ["1/10", "0", "{omega}"]
-gamma = ["3/5", "0", "4/5"]
-[[measure]]
-kind = "drift"
-cases = ["mine"]
-runs = [{{ precision = "double", horizon = "1", samples = 4 }}]
-"""
+def own_top(centre: str, omega: str) -> str:
+    """A plan of the drift of one's own top."""
+    data = f'centre = [0, 0, "{centre}"]\nomega = ["1/10", 0, "{omega}"]\ngamma = ["3/5", 0, "4/5"]\n'
+    return f'[[top]]\nname = "mine"\ninertia = [3, 2, 1]\nweight = 1\n{data}{drift("mine")}'
 
 
 @pytest.mark.slow
 def test_two_tops_of_one_name_in_two_plans_are_two(tmp_path: Path) -> None:
     def ran(centre: str, omega: str) -> Row:
-        (tmp_path / "plan.toml").write_text(PLAN.format(centre=centre, omega=omega))
-        (task,) = expand(load(str(tmp_path / "plan.toml"))[0])
+        (task,) = tasks_of(tmp_path, own_top(centre, omega))
         return msgspec.structs.replace(measure(task), data=data_of(task.case))
 
     mine = ran("1/2", "9/10")
@@ -167,17 +151,12 @@ def test_numbers_of_any_length_are_written_and_read(tmp_path: Path) -> None:
     assert store.read(store.write(report(made), tmp_path)).rows[0].data == made.data
 
 
-ENSEMBLE = """[[measure]]
-kind = "growth"
-cases = ["mine"]
-runs = [{ precision = "double", horizon = "1", samples = 4, decades = 1, starts = 8 }]
-"""
-
-
 @pytest.mark.slow
 def test_every_row_of_a_motion_has_its_data_those_of_ensembles_too(tmp_path: Path) -> None:
-    (tmp_path / "plan.toml").write_text(PLAN.format(centre="1/2", omega="9/10") + ENSEMBLE)
-    found = [each for _, each in sorted(rows(expand(load(str(tmp_path / "plan.toml"))[0]), 1), key=itemgetter(0))]
+    run = '{ precision = "double", horizon = "1", samples = 4, decades = 1, starts = 8 }'
+    ensemble = f'[[measure]]\nkind = "growth"\ncases = ["mine"]\nruns = [{run}]\n'
+    tasks = tasks_of(tmp_path, own_top("1/2", "9/10") + ensemble)
+    found = [each for _, each in sorted(rows(tasks, 1), key=itemgetter(0))]
     assert [(each.starts, each.data) for each in found] == [
         (starts, Data(("3", "2", "1"), "1", ("0", "0", "1/2"), ("1/10", "0", "9/10"), ("3/5", "0", "4/5")))
         for starts in (1, 8)

@@ -9,7 +9,7 @@ from heavytop.features.work_precision import kind as work_precision
 from heavytop.measure.integrator import Repeats
 from heavytop.records import Row
 from heavytop.report.compare.noise import Policy, Rule, Timings
-from support.reports import compare, expand, load, measure, replace, store
+from support.reports import compare, measure, replace, store, tasks_of
 from support.small_reports import report, row
 
 ENVIRONMENT = {
@@ -107,8 +107,7 @@ def test_a_fastest_run_slower_than_the_median_is_refused(tmp_path: Path) -> None
         store.read(store.write(report(bad), tmp_path))
 
 
-PLAN = """name = "t"
-[[measure]]
+PLAN = """[[measure]]
 kind = "work_precision"
 cases = ["euler"]
 horizon = "20"
@@ -118,8 +117,7 @@ ladders = [{ integrator = "heyoka", tolerances = ["1e-6"] }]
 
 
 def ran(folder: Path, more: str) -> Row:
-    (folder / "t.toml").write_text(PLAN + more)
-    (task,) = expand(load(str(folder / "t.toml"))[0])
+    (task,) = tasks_of(folder, PLAN + more)
     return measure(task)
 
 

@@ -1,15 +1,18 @@
-"""Small reports to compare."""
+"""Small reports to compare, and what their comparison says."""
 
 from __future__ import annotations
+
+from typing import Any
 
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
 from heavytop.records import SCHEMA, Report, Row
+from heavytop.report.compare.noise import Policy
 from support import report_helpers
 from support.report_helpers import error
-from support.reports import replace
+from support.reports import compare, replace
 
-__all__ = ["error", "report", "row"]
+__all__ = ["error", "judged", "report", "row", "verdicts"]
 
 
 def row(**changes) -> Row:
@@ -30,3 +33,15 @@ def row(**changes) -> Row:
 
 def report(*rows: Row) -> Report:
     return Report(SCHEMA, {"name": "test"}, {"packages": {"heyoka": "7"}}, list(rows))
+
+
+def judged(old: Row, new: Row, **policy: Any) -> tuple[str, str]:
+    """The verdict on the second of two rows, and the reasons of what changed."""
+    result = compare(report(old), report(new), Policy(**policy))
+    return result.verdict, "; ".join(finding.reason for finding in result.changed)
+
+
+def verdicts(old: Row, new: Row, policy: Policy | None = None, **options: Any) -> dict[str, str]:
+    """The verdict on each metric, law and series of the second of two rows."""
+    found = compare(report(old), report(new), policy or Policy(**options)).findings
+    return {finding.metric: finding.verdict.value for finding in found}
