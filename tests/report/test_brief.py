@@ -88,8 +88,9 @@ def test_a_mutated_report_is_refused_or_not_the_same(tmp_path: Path, path: tuple
 @settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_truncated_report_is_refused_at_every_length(tmp_path: Path, length: int) -> None:
     (tmp_path / "report.json").write_text(json.dumps(DOCUMENT)[:length])
-    with pytest.raises(InputError, match="not a whole report"):
-        store.read_brief(tmp_path)
+    for read in (store.read, store.read_brief):
+        with pytest.raises(InputError, match="not a whole report"):
+            read(tmp_path)
 
 
 @pytest.mark.parametrize("indent", [None, 1])
@@ -120,16 +121,25 @@ def test_brief_and_whole_reports_compare_alike_however_they_are_laid_out(tmp_pat
         (b'"band":null', b'"band":-0.5', "not a whole report"),
         (b'"1E-20"', b'"tiny"', "not a finite number"),
         (b'"steps":10', b'"steps":"ten"', "not a whole report"),
+        (b'"metrics"', b'"metric"', "not a whole report"),
+        (b"heavytop-report/2", b"other-report/7", "schema"),
+        (b'"log10":-12.0', b'"log10":null', "disagree"),
+        (b'"1E-12"', b'"much"', "not a finite number"),
+        (b'"time_reached":"100"', b'"time_reached":"99"', "a success that reached only 99"),
+        (b'"value":"1E-12","log10":-12.0', b'"value":"nan","log10":null', "said to be finite"),
     ],
 )
-def test_a_wrong_row_is_found_while_comparing(tmp_path: Path, old: bytes, new: bytes, message: str) -> None:
+def test_an_edited_report_is_refused_where_it_is_read_and_while_comparing(
+    tmp_path: Path, old: bytes, new: bytes, message: str
+) -> None:
     path = store.write(GOOD, tmp_path)
     content = path.read_bytes()
     assert old in content
     (tmp_path / "report.json.sha256").unlink()
     path.write_bytes(content.replace(old, new))
-    with pytest.raises(InputError, match=message):
-        compare(store.read_brief(tmp_path), store.read_brief(tmp_path), Policy())
+    for read in (store.read, store.read_brief):
+        with pytest.raises(InputError, match=message):
+            compare(read(tmp_path), read(tmp_path), Policy())
 
 
 def test_a_row_missing_at_the_start_and_one_new_are_told_apart(tmp_path: Path) -> None:

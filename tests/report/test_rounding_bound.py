@@ -26,7 +26,7 @@ from heavytop.report.compare.noise import (
 from heavytop.top.amplification import FOLLOWED, amplification
 from heavytop.top.equations import HEAVY_TOP, Parameters
 from support.reports import compare, replace
-from support.small_reports import error, report, row
+from support.small_reports import error, judged, report, row
 
 FREE = Data(("4", "2", "1"), "0", ("0", "0", "0"), ("3", "1/2", "1/3"), ("3/5", "0", "4/5"))
 UPRIGHT = Data(("1", "1", "1/2"), "1", ("0", "0", "1"), ("0", "0", "0"), ("0", "0", "1"))
@@ -126,11 +126,6 @@ def test_an_escape_time_moves_by_two_decades_of_noise_either_way() -> None:
 def one(value: str, band: float | None, name: str = "solution_error_gamma_max", **changes) -> Row:
     metric = replace(error(value), band=band)
     return row(metrics={name: metric}, **{"data": FREE, **changes})
-
-
-def judged(old: Row, new: Row, **policy) -> tuple[str, str]:
-    result = compare(report(old), report(new), Policy(**policy))
-    return result.verdict, "; ".join(finding.reason for finding in result.changed)
 
 
 def test_a_baseline_whose_reruns_part_excuses_nothing_that_rounding_does_not_explain() -> None:
