@@ -3,6 +3,8 @@
 import ast
 import importlib
 import re
+import runpy
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -25,3 +27,9 @@ def test_what_a_script_takes_from_the_package_is_there(script: Path) -> None:
             module = importlib.import_module(node.module)
             for name in (alias.name for alias in node.names):
                 assert hasattr(module, name) or importlib.import_module(f"{node.module}.{name}"), name
+
+
+def test_the_functions_whose_time_is_measured_are_there() -> None:
+    script = runpy.run_path(str(ROOT / "tools" / "plan_times.py"))
+    for owner, attribute in map(script["owner"], chain(*script["PARTS"].values())):
+        assert callable(getattr(owner, attribute))

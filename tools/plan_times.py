@@ -1,5 +1,6 @@
-"""Where does the processor time of a plan go: compiling, integrating (runs and their reruns), the truth, scoring, what
-else the rounding noise takes, the rest?  The last line is the share of integrating once everything is compiled.
+"""Where does the processor time of a plan go: compiling, integrating (runs and their reruns), runs of multiword that
+are references, the rest of the truth, scoring, what else the rounding noise takes, the rest?  The last line is the
+share of integrating once everything is imported and compiled.
 
 Run: python tools/plan_times.py [PLAN]     (default; one process, processor seconds, by kind and row)
 """
@@ -29,9 +30,10 @@ PARTS = {
         "integrate.registry:Integrator.propagate_many",
         "integrate.heyoka.motions:propagate",
     ),
+    "reference runs": ("measure.truth:_trajectories",),
     "truth": ("measure.truth:truth", "measure.truth:uncertified", "measure.truth:reference", "measure.truth:certified"),
     "scoring": ("measure.scorer:Scorer.__call__", "measure.scorer:Drift.flush", "measure.scorer:flush_together"),
-    "noise": ("measure.rounding_noise:Reruns._of",),
+    "noise": ("measure.rounding_noise:Reruns.of",),
 }
 
 
@@ -62,16 +64,23 @@ class Clock:
         return call
 
 
+def owner(function: str) -> tuple[Any, str]:
+    """The module or class of ``MODULE:NAME``, and its attribute."""
+    module, _, name = function.partition(":")
+    *classes, attribute = name.split(".")
+    return reduce(getattr, classes, import_module(f"heavytop.{module}")), attribute
+
+
 def watch(clock: Clock) -> None:
     """Put the clock around each function, wherever a module has it."""
-    for part, places in PARTS.items():
-        for place in places:
-            module, _, name = place.partition(":")
-            *classes, attribute = name.split(".")
-            owner = reduce(getattr, classes, import_module(f"heavytop.{module}"))
-            original = getattr(owner, attribute)
+    for part, functions in PARTS.items():
+        for function in functions:
+            owned_by, attribute = owner(function)
+            original = getattr(owned_by, attribute)
             timed = clock.around(original, part)
-            owners = [owner] if classes else [m for n, m in sys.modules.items() if n.startswith("heavytop")]
+            owners = [owned_by]
+            if not isinstance(owned_by, type):
+                owners = [m for n, m in sys.modules.items() if n.startswith("heavytop")]
             for one in owners:
                 if getattr(one, attribute, None) is original:
                     setattr(one, attribute, timed)
@@ -81,6 +90,7 @@ def main() -> None:
     plan = sys.argv[1] if len(sys.argv) > 1 else "default"
     only = sys.argv[2] if len(sys.argv) > 2 else ""
     _, _, tasks = read(plan, KINDS)
+    import_module("sympy")  # its time is that of the start, whichever row needs it first
     clock = Clock()
     watch(clock)
     kinds: dict[str, Counter[str]] = {}
@@ -99,7 +109,9 @@ def main() -> None:
     for kind, spent in [*kinds.items(), ("all", whole)]:
         parts = "  ".join(f"{part} {seconds:.1f}" for part, seconds in spent.most_common())
         print(f"{sum(spent.values()):7.1f}  {kind:20} {parts}")
-    print(f"integrating: {whole['integrating'] / (whole.total() - whole['compiling']):.1%}")
+    busy = whole.total() - whole["compiling"]
+    integrated = whole["integrating"] + whole["reference runs"]
+    print(f"integrating: {whole['integrating'] / busy:.1%}, with the runs of references {integrated / busy:.1%}")
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ import math
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from contextlib import suppress
 from dataclasses import dataclass
 from decimal import MAX_EMAX, MIN_EMIN, ROUND_HALF_EVEN, Context, Decimal, Overflow
 from fractions import Fraction
@@ -426,9 +427,16 @@ def _integer_and_exponent(significand: int, exponent: int) -> str:
     return f"{Decimal(significand * 5**-exponent)}e{exponent}"
 
 
+_NORMAL = 16_000
+"""Numbers from 2^-16000 to 2^16000 are normal in every format wider than double."""
+
+
 def rounded(value: Fraction, precision: Precision) -> Fraction:
-    """The exact value of ``value`` rounded to ``precision``."""
-    return Fraction(_nearest_double(value)) if precision.family == "double" else exact(number(value, precision))
+    """The exact value of ``value`` rounded to nearest in ``precision``; raises InputError as :func:`number`."""
+    if precision.family == "double":
+        return Fraction(_nearest_double(value))
+    exponent = value.numerator.bit_length() - value.denominator.bit_length()
+    return round_to(value, precision.bits) if abs(exponent) < _NORMAL else exact(number(value, precision))
 
 
 def decimal_text(value: Fraction, digits: int) -> str:
@@ -458,6 +466,9 @@ def log10(value: Fraction) -> float | None:
     """log10 |value| to six decimals, None for 0; no exponent is too large or too small."""
     if value == 0:
         return None
+    with suppress(OverflowError):
+        if 1e-300 < (size := abs(float(value))) < 1e300:
+            return round(math.log10(size), 6)
     shift = value.numerator.bit_length() - value.denominator.bit_length()
     return round(shift * math.log10(2) + math.log10(abs(value) / Fraction(2) ** shift), 6)
 

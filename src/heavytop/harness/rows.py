@@ -36,7 +36,7 @@ from heavytop.measure.rounding_noise import factor, scaled
 from heavytop.measure.scalar import of_fraction
 from heavytop.measure.truth import seconds_a_step as words_seconds
 from heavytop.measure.truth import truth
-from heavytop.precision import Precision, decimal_text, exact, exact_text, number, parse, time_text
+from heavytop.precision import Precision, decimal_text, exact, exact_text, parse, rounded, time_text
 from heavytop.records import (
     CONTRADICTION,
     EXACT,
@@ -160,7 +160,7 @@ class Task:
 def run_with_attitude(task: Task) -> tuple[Trajectory, AttitudeScorer]:
     """The run of a task with ξ beside Ω and γ, and its scorer; restarted where it was interrupted."""
     case, precision = task.given, task.precision
-    times, keep = ([exact(number(time, precision)) for time in part] for part in (task.times, task.keep))
+    times, keep = ([rounded(time, precision) for time in part] for part in (task.times, task.keep))
     xi = resolve(case.body or case.top, case.given_start or case.start).xi
     problem = Problem.of(case.top, case.start, precision, case.system, xi)
     reference = truth(replace(problem, xi=None), times)

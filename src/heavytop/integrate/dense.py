@@ -30,7 +30,7 @@ from heavytop.integrate.registry import expected_steps, name_of
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.multiword.double_double.double_double_run import Floating
 from heavytop.multiword.problem import ResumableRun, Scaled, Status
-from heavytop.precision import DOUBLE, decimal_text, exact, number
+from heavytop.precision import DOUBLE, decimal_text, exact, number, rounded
 
 _SPARE_BITS = 64
 MOST_STEPS = 10**8
@@ -246,7 +246,7 @@ def dense(
             f"The integrator {name} hands over no polynomial of its steps, for events or states between samples.",
             f"Use {' or '.join(_DENSE)}.",
         )
-    end = exact(number(until, problem.precision))
+    end = rounded(until, problem.precision)
     steps = expected_steps(problem, end)
     if steps > MOST_STEPS and not (step_limit is not None and step_limit <= MOST_STEPS):
         raise OutOfReach(

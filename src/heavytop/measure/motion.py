@@ -18,7 +18,7 @@ from heavytop.integrate.registry import IntegratorSource, described, expected_st
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.scalar import GUARD_BITS, text, to_balls
 from heavytop.measure.scorer import Drift
-from heavytop.precision import Precision, cross, decimal_text, dot, exact, exact_text, number
+from heavytop.precision import Precision, cross, decimal_text, dot, exact_text, rounded
 from heavytop.records import Metric
 from heavytop.top.attitude import Output, document_of, euler_angles, perpendicular, unwrap
 from heavytop.top.bodies import PIVOT, Body
@@ -163,7 +163,7 @@ class FollowedAngles:
         return sorted(inner - {first, last}, key=abs)
 
     def _rounded(self, time: Fraction) -> Fraction:
-        return exact(number(time, self._problem.precision))
+        return rounded(time, self._problem.precision)
 
 
 def _fastest(problem: Problem) -> Fraction:
@@ -298,7 +298,7 @@ def compute(
     xi = setup.xi if attitude or outputs else None
     problem = Problem.of(setup.top, setup.start, precision, system, xi)
     texts_of = written or [exact_text(time) for time in times]
-    requested = {exact(number(time, precision)): text for time, text in zip(times, texts_of, strict=True)}
+    requested = {rounded(time, precision): text for time, text in zip(times, texts_of, strict=True)}
     integrals = holding(setup.top, setup.start, system)
     watcher = _Watcher(problem, integrals, frozenset(requested), reached or (lambda time: None), attitude, setup)
     samples = times if watcher.angles is None else watcher.angles.samples(times)
@@ -307,7 +307,7 @@ def compute(
         steps, end = expected_steps(problem, times[-1]), times[-1]
         evenly = [end * i / _PARTS for i in range(1, _PARTS)] if steps > _STEPS_A_PART * _PARTS else []
         early = [end / 2**n for n in range(1, steps.bit_length())]
-        intermediate = {exact(number(time, precision)) for time in (*evenly, *early)}
+        intermediate = {rounded(time, precision) for time in (*evenly, *early)}
         samples = sorted({*samples, *(intermediate - requested.keys())}, key=abs)
     options = (options or {}) | ({} if xi is None else {"xi": xi})
     propagate = registry.watched(integrator, options, watcher)

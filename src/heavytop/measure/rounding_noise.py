@@ -21,7 +21,7 @@ from heavytop.integrate.registry import Integrator
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.scorer import Scorer, flush_together
 from heavytop.measure.truth import Truth, closed_form, uncertified
-from heavytop.precision import DOUBLE, exact, number, round_to
+from heavytop.precision import DOUBLE, round_to, rounded
 from heavytop.records import Metric
 from heavytop.top.equations import GYROSTAT, Parameters
 from heavytop.top.heavy_top import HeavyTop
@@ -142,7 +142,7 @@ class Reruns:
             end = true.ends or end
         problem = _shortened(self.problem)
         samples = _SAMPLES if closed_form(problem) else _SAMPLES_OF_CHAOS
-        rerun_times = [exact(number(time, DOUBLE)) for time in some_of(times, end, samples)]
+        rerun_times = [rounded(time, DOUBLE) for time in some_of(times, end, samples)]
         truth: Truth | str = true if isinstance(true, str) else uncertified(problem, rerun_times)
         reruns = self._rerun(problem, rerun_times, lambda problem: Scorer(problem, truth))
         return banded(run, metrics, [scorer.metrics() for scorer in reruns])

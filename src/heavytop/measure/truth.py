@@ -399,13 +399,13 @@ def certified(solution: ExactSolution, time: Fraction, bits: int) -> Known | Non
     return Known(solution, certificate, time, bits) if certificate.agreed_digits >= needed else None
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)
 def _enclosure(solution: ExactSolution) -> Validated:
     """The second source of a motion; rows of several formats share its pilots."""
     return enclosure_of(solution, effort=_EFFORT)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)
 def closed_form(problem: Problem) -> ExactSolution | None:
     """The closed form of a rounded problem, or None; consecutive rows of a problem share it."""
     if problem.system is GYROSTAT:
@@ -414,7 +414,7 @@ def closed_form(problem: Problem) -> ExactSolution | None:
     return next(matches(problem.top, problem.start, problem.system), None)
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=32)
 def states_of(solution: ExactSolution) -> Evaluate:
     """The states of a motion, cached for rows and reruns; bits are rounded up to a multiple of 64."""
     states = lru_cache(maxsize=_SHARED_STATES)(solution.state)

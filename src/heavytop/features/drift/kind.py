@@ -17,7 +17,7 @@ from heavytop.kind import Kind, with_explanation
 from heavytop.measure.rounding_noise import Reruns
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import truth
-from heavytop.precision import DOUBLE, exact, number, parse, time_text
+from heavytop.precision import DOUBLE, parse, rounded, time_text
 from heavytop.records import HEYOKA, NOISE, NOT_CARRIED, NOT_MEASURED, Beside, Metric, Row
 from heavytop.report.document.document import Block, Chart
 from heavytop.report.render.page import attitude_columns, digits_columns, digits_headline, motions
@@ -93,12 +93,12 @@ class DriftKind(Kind):
         case, precision = task.given, task.precision
         problem = Problem.of(case.top, case.start, precision, case.system)
         # samples are at the rounded times, which select those of the series
-        keep = [exact(number(time, precision)) for time in task.keep]
-        scorer = Scorer(problem, truth(problem, [exact(number(time, precision)) for time in task.times]), keep)
+        keep = [rounded(time, precision) for time in task.keep]
+        scorer = Scorer(problem, truth(problem, [rounded(time, precision) for time in task.times]), keep)
         stored = saved.load()
         if stored is not None:
             scorer.restore(stored["measures"])
-            _require_same_samples(scorer, [exact(number(t, precision)) for t in task.times], stored["run"]["samples"])
+            _require_same_samples(scorer, [rounded(t, precision) for t in task.times], stored["run"]["samples"])
 
         def mark(resume_point: ResumePoint) -> None:
             if saved.due():

@@ -23,7 +23,7 @@ from heavytop.measure.integrator import Ended, complete, growing
 from heavytop.measure.scalar import of_fraction
 from heavytop.measure.scorer import DRIFT, Scorer
 from heavytop.measure.truth import EnsembleReference, reference
-from heavytop.precision import decimal_text, exact, number, parse, physical, time_text, usable_tolerance
+from heavytop.precision import decimal_text, exact, parse, physical, rounded, time_text, usable_tolerance
 from heavytop.records import HEYOKA, NOT_CARRIED, Beside, Law, Metric, Quantity, Row, by_name
 from heavytop.report.document.document import Block, Cell, Chart, computed_by, integral_text, short
 from heavytop.report.document.document import Table as Cells
@@ -154,7 +154,7 @@ class Growth(Kind):
         # with the default ξ of a start without attitude
         posed = [Problem.of(*m, precision, case.system, perpendicular(m[1].gamma)) for m in members] if turned else true
         biased = [_biased(problem, run.bias) for problem in posed]
-        times = [exact(number(time, precision)) for time in task.times]
+        times = [rounded(time, precision) for time in task.times]
         stored = saved.load()
         done = _Done({}) if stored is None else msgspec.convert(stored, _Done, strict=False)
 
@@ -212,7 +212,7 @@ def _biased(problem: Problem, bias: str | None) -> Problem:
     if bias is None:
         return problem
     first, *rest = problem.parameters.inertia
-    biased = exact(number(first * (1 + exact(bias)), problem.precision))
+    biased = rounded(first * (1 + exact(bias)), problem.precision)
     return replace(problem, parameters=problem.parameters._replace(inertia=(biased, *rest)))
 
 

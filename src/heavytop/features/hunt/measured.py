@@ -27,7 +27,7 @@ from heavytop.integrate.multiword.lanes import propagate_multiword_ensemble
 from heavytop.integrate.peers.command import Command, begin_row
 from heavytop.integrate.registry import Integrator, is_third_party
 from heavytop.integrate.trajectory import Outcome, Problem
-from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, Vector, dot, exact, number, real, round_to
+from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, Vector, dot, exact, number, real, round_to, rounded
 from heavytop.processes import GuardedProcess
 from heavytop.records import FAILED, OUT_OF_TIME
 from heavytop.top.amplification import amplification, digits_eaten, rate
@@ -447,7 +447,7 @@ class Meter:
         self, integrator: Integrator, precision: Precision, horizon: Fraction, against: Integrator | None
     ) -> None:
         self.integrator, self.precision, self.horizon, self.against = integrator, precision, horizon, against
-        self.times = [exact(number(horizon * i / SAMPLES, precision)) for i in range(1, SAMPLES + 1)]
+        self.times = [rounded(horizon * i / SAMPLES, precision) for i in range(1, SAMPLES + 1)]
         self._fine = DOUBLE_DOUBLE if precision == DOUBLE else real(2 * precision.bits)
         python = is_third_party(integrator.name) and not isinstance(integrator.source, Command)
         self._shift = Fraction(1, 2 ** (precision.bits + _MORE_BITS))

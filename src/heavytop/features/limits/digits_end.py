@@ -24,7 +24,7 @@ from heavytop.exact.solution import ExactSolution
 from heavytop.integrate.frames import Setup
 from heavytop.integrate.registry import propagator
 from heavytop.integrate.trajectory import Problem
-from heavytop.precision import DOUBLE, Precision, decimal_text, exact, exact_text, number, physical, real
+from heavytop.precision import DOUBLE, Precision, decimal_text, exact, exact_text, physical, real, rounded
 from heavytop.top.bodies import Body
 from heavytop.top.equations import GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -178,7 +178,7 @@ def _relative(value: Fraction, true: Fraction) -> Fraction:
 
 
 def _rounded(state: Sequence[Fraction], form: Precision) -> State:
-    values = [exact(number(value, form)) for value in state]
+    values = [rounded(value, form) for value in state]
     return State(values[:3], values[3:])
 
 

@@ -31,7 +31,7 @@ from heavytop.integrate.trajectory import Outcome, Problem, TaylorStep, Trajecto
 from heavytop.measure.running import RunningStatistics, Sums
 from heavytop.measure.scalar import GUARD_BITS, largest, metric, resolved, to_ball
 from heavytop.measure.scorer import OBSERVED_ORDER
-from heavytop.precision import Precision, decimal_text, exact, number
+from heavytop.precision import Precision, decimal_text, exact, rounded
 from heavytop.records import Metric, Quantity, by_name
 from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -163,7 +163,7 @@ def single_calls(
     """
     integrator = stepped(integrator)
     whole = integrator.propagate(top, start, [until], precision, system)
-    times = [exact(number(until * i / _CALLS, precision)) for i in range(1, _CALLS)]
+    times = [rounded(until * i / _CALLS, precision) for i in range(1, _CALLS)]
     sampled = integrator.propagate(top, start, times, precision, system)
     begins = [whole.problem.native(whole.problem.start.flat), *sampled.states]
     problems = [_from(whole.problem, state) for state in begins]
@@ -171,7 +171,7 @@ def single_calls(
     length = integrator.set_to[1] if integrator.set_to else until / max(whole.steps, 1)
 
     def over(n: int) -> list[Trajectory]:
-        tau = exact(number(n * length, precision))
+        tau = rounded(n * length, precision)
         asked = replace(integrator, set_to=("step", tau)) if fixed else integrator
         return asked.propagate_many(problems, [tau])
 
@@ -187,8 +187,7 @@ def single_calls(
             if n**2 * turned <= _LONGEST**2:
                 longer[n] = over(n)
     calls = [
-        Call(begin, exact(number(length, precision)), own[i].states[0], _reached(longer, i))
-        for i, begin in enumerate(begins)
+        Call(begin, rounded(length, precision), own[i].states[0], _reached(longer, i)) for i, begin in enumerate(begins)
     ]
     return whole, [(time + call.length, call) for time, call in zip((Fraction(0), *times), calls, strict=True)]
 

@@ -22,7 +22,7 @@ from heavytop.harness.rows import Find, PlanTable, Task, computed, exact_row
 from heavytop.harness.sweeps import Lazy, Sweep
 from heavytop.integrate.trajectory import Outcome
 from heavytop.kind import Kind
-from heavytop.precision import DOUBLE, EXTENDED, exact, number, parse
+from heavytop.precision import DOUBLE, EXTENDED, exact, parse, rounded
 from heavytop.records import HEYOKA, Against, Beside, Metric, Row, Spread
 from heavytop.report.document.document import Block, Card, Chart, Headline, In, Note, short
 from heavytop.report.document.motions import LossLimits, WorseMotions
@@ -93,7 +93,7 @@ class Survey(Kind):
         """The chunk's records.  Raises Contradiction where the computed reference is off the proven one."""
         assert isinstance(task.case, Chunk)
         precision = task.precision
-        times = [exact(number(time, precision)) for time in task.times]
+        times = [rounded(time, precision) for time in task.times]
         motions = drawn(task.case, precision, task.seed)
         asked = task.key.subject.tolerance
         options = {"tolerance": exact(asked)} if asked else {}

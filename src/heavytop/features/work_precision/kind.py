@@ -36,7 +36,7 @@ from heavytop.measure.integrator import TOO_LONG, Repeats, doubtful_counts, requ
 from heavytop.measure.scalar import RELATIVE, metric, of_fraction
 from heavytop.measure.scorer import DRIFT, ERRORS, SOLUTION_ERROR, Scorer
 from heavytop.measure.truth import Truth, truth
-from heavytop.precision import DOUBLE, exact, number, parse, physical, time_text, usable_tolerance
+from heavytop.precision import DOUBLE, exact, parse, physical, rounded, time_text, usable_tolerance
 from heavytop.records import FINEST, Beside, Explained, Metric, Quantity, Row, Subject, by_name
 from heavytop.report.document.document import Block, Chart, In, Note, clip
 from heavytop.report.document.document import Table as Cells
@@ -274,8 +274,8 @@ def _error(scorer: Scorer) -> Fraction | None:
 
 
 def _scored(task: Task, problem: Problem, run: Trajectory) -> Scorer:
-    keep = [exact(number(time, problem.precision)) for time in task.keep]
-    times = tuple(exact(number(time, problem.precision)) for time in task.times)
+    keep = [rounded(time, problem.precision) for time in task.keep]
+    times = tuple(rounded(time, problem.precision) for time in task.times)
     scorer = Scorer(problem, _truth(problem, times), keep)
     scorer.add_states(run.times, run.states)
     return scorer

@@ -154,9 +154,9 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         declared.require(self.name, start, system, instants[-1], precision, xi)
         value = self._control_value(control, precision)
         if value is not None and self.control == "step":
-            value = exact(number(declared.step(self.name, value, instants), precision))
+            value = rounded(declared.step(self.name, value, instants), precision)
         problem = Problem.of(top, start, precision, system, xi)
-        grid = [exact(number(time, precision)) for time in instants]
+        grid = [rounded(time, precision) for time in instants]
         request = self.request(problem, grid, value)
         with session(self) as program:
             overhead = program.empty_request(problem)
@@ -177,12 +177,12 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         if value <= 0 or (control == "tolerance" and value > 1):
             limits = "above 0" if control == "step" else "above 0, up to 1"
             raise InputError(f"{self.name} cannot use the {control} {decimal_text(value, 6)}.", f"Give {limits}.")
-        return exact(number(value, precision))
+        return rounded(value, precision)
 
     def default(self, precision: Precision) -> Fraction | None:
         """The default of its control parameter: the step 1/100 rounded to the format, or the eps of the format."""
         if self.control == "step":
-            return exact(number(DEFAULT_STEP, precision))
+            return rounded(DEFAULT_STEP, precision)
         return precision.eps if self.control else None
 
     def _trajectory(self, request: ProgramRequest, reply: Reply, seconds: float) -> Trajectory:

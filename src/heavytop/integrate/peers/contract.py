@@ -29,7 +29,7 @@ import numpy
 from heavytop.errors import HeavyTopError, InputError, PeerFailed, Unsupported
 from heavytop.guard import stopwatch
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.precision import DOUBLE, Precision, Vector, cross, decimal_text, dot, exact, number
+from heavytop.precision import DOUBLE, Precision, Vector, cross, decimal_text, dot, exact, number, rounded
 from heavytop.top.attitude import near_quaternion, perpendicular, rotation_of, rows_of
 from heavytop.top.equations import HEAVY_TOP, NAMES, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -302,7 +302,7 @@ class CheckedPlugin:
         """
         problem = Problem.of(top, start, precision, system, xi)
         beside = self.options | options if xi is None else {"xi": xi, **self.options, **options}
-        asked = [exact(number(time, precision)) for time in times]
+        asked = [rounded(time, precision) for time in times]
         if self.declared is not None and asked:
             self.declared.require(self.name, start, system, asked[-1], precision, xi)
             if self.declared.fixed_grid:

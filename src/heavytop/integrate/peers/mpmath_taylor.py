@@ -12,7 +12,7 @@ import numpy
 from heavytop.errors import InputError
 from heavytop.integrate.peers.contract import with_tolerance
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.precision import exact, number
+from heavytop.precision import exact, number, rounded
 from heavytop.top.heavy_top import check_times
 
 
@@ -26,7 +26,7 @@ def odefun(problem: Problem, times: Sequence[Fraction], tolerance: Fraction | No
     import mpmath
 
     precision, system = problem.precision, problem.system
-    grid = [exact(number(time, precision)) for time in check_times(times)]
+    grid = [rounded(time, precision) for time in check_times(times)]
     if grid[-1] < 0:
         raise InputError("mpmath.odefun integrates forwards only.", "Give positive times.")
     evaluations = 0
