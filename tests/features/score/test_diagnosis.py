@@ -196,6 +196,14 @@ def test_columns_in_any_order_are_named() -> None:
 
 
 @pytest.mark.slow
+def test_vectors_in_each_other_s_place_and_in_other_axes_are_put_in_words() -> None:
+    top, start, times = problem(42)
+    (told,) = found(top, start, times, runge_kutta(top, start, times)[:, [5, 4, 3, 2, 1, 0]] * [1, 1, -1, 1, 1, -1])
+    said = "The columns mean something else: γ stands before Ω; columns 1, 2, 3 of Ω and γ are axes 3, 2, −1;"
+    assert diagnosis_text(told).startswith(said)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("of", "axis"), [("omega", 2), ("both", 1)])
 def test_vectors_in_axes_of_space_are_told(of: str, axis: int) -> None:
     """Each state turned so that γ is that axis, and about it by any angle."""

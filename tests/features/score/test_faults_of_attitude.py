@@ -10,10 +10,11 @@ import pytest
 from heavytop.features.score.diagnose import hypotheses
 from heavytop.features.score.measurement import assess
 from heavytop.features.score.trajectories.files import read
-from heavytop.precision import cross
+from heavytop.integrate.heyoka.engines import compiled
+from heavytop.precision import DOUBLE, cross
 from heavytop.top.attitude import rotation_of
 from heavytop.top.bodies import Body
-from heavytop.top.equations import HEAVY_GYROSTAT, Parameters
+from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, Parameters
 
 CENTRAL = np.array([[0.9, 0.05, -0.1], [0.05, 0.7, 0.08], [-0.1, 0.08, 0.6]])
 CENTRE, ROTOR, START = np.array([0.2, -0.3, 0.5]), np.array([0.4, -0.2, 0.3]), np.array([0.8, -0.2, 0.4, 0.4])
@@ -147,3 +148,12 @@ def test_weights_of_one_are_the_equations_of_the_gyrostat_in_any_axes() -> None:
     assert weighted([1] * 12 + [-1] * 6) == (*plain[:3], *(-rate for rate in plain[3:]))
     assert weighted([1] * 9 + [-1] * 3 + [1] * 6) == (*(-rate for rate in plain[:3]), *plain[3:])
     assert len(set(map(weighted, ([1] * n + [0] + [1] * (17 - n) for n in range(18))))) == 18
+
+
+@pytest.mark.slow
+def test_equations_that_differ_in_their_weights_are_compiled_once() -> None:
+    systems = [
+        hypotheses._Weighted("weighted", hypotheses._weighted, HEAVY_TOP.angular_velocity, numbers=(weight,))
+        for weight in (-1.0, 0.0)
+    ]
+    assert compiled(systems[0], DOUBLE) is compiled(systems[1], DOUBLE)

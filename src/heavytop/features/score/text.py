@@ -272,7 +272,7 @@ def _said(fit: Diagnosis, system: str) -> str:
         "in_full": _IN_FULL,
         "still": _still(**numbers) if fit.kind == "frozen" else "",
     }
-    return text.format(**more, **numbers)
+    return text.format(**numbers | more)
 
 
 def _still(states: str, vector: str = "", **_: str) -> str:

@@ -54,11 +54,11 @@ Exact = int | Fraction
 class Jet:
     """A function of time by its exact derivatives at t = 0: a ring in which the fields can be evaluated.
 
-    at: gives the n-th derivative; n = 0, 1, ... in turn.
+    at: gives the n-th derivative, computed once; n = 0, 1, ... in turn.
     """
 
     def __init__(self, at: Callable[[int], Exact]) -> None:
-        self.at = at
+        self.at = cache(at)
 
     def __add__(self, other: Jet | Exact) -> Jet:
         if not isinstance(other, Jet):

@@ -7,7 +7,7 @@ Numbers of the top are fitted to the first integrals, which are linear in them: 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cache
 from itertools import permutations, product
@@ -422,10 +422,10 @@ class _Weighted(System):
     """Equations of a heavy gyrostat with a weight at each term, in the axes of a file.
 
     numbers: k of the rotor, the rows of A with v_file = A v_principal, six rows of weights; they enter the compiled
-    code, which is one for all of them, as a rotor does.
+    code, which is one for all of them, as a rotor does: systems that differ in them alone are equal.
     """
 
-    numbers: tuple[float, ...] = ()
+    numbers: tuple[float, ...] = field(default=(), compare=False)
 
     def parameters(self, top: HeavyTop, start: State) -> Parameters:
         """Moments, n and the numbers."""
