@@ -35,6 +35,10 @@ def quaternions() -> numpy.ndarray:
     return run().quaternions()
 
 
+def scalar_last() -> numpy.ndarray:
+    return quaternions()[:, [1, 2, 3, 0]]
+
+
 def omegas() -> numpy.ndarray:
     return run().to_numpy()[:, :3]
 
@@ -58,12 +62,11 @@ def vectors() -> numpy.ndarray:
     return 2 * numpy.arctan2(length, q[:, :1]) * q[:, 1:] / length
 
 
-def ros() -> str:
-    names = [f"pose.orientation.{a}" for a in "xyzw"] + [f"twist.angular.{a}" for a in "xyz"]
-    stamps = [f"{1700000000 + int(k >= 10)},{k % 10 * 100000000}" for k in range(11)]
-    body = rows(quaternions()[:, [1, 2, 3, 0]], omegas()).splitlines()
-    head = ",".join(["header.stamp.sec", "header.stamp.nanosec", *names])
-    return HEAD + "\n".join([head, *(f"{stamp},{line}" for stamp, line in zip(stamps, body, strict=True))])
+def exported(stamp: str, times: Sequence[str], attitude: str, rate: str) -> str:
+    """Rows of a program that names its columns by paths, which end in x, y, z, w."""
+    names = [attitude + a for a in "xyzw"] + [rate + a for a in "xyz"]
+    body = rows(scalar_last(), omegas()).splitlines()
+    return HEAD + "\n".join([",".join([stamp, *names]), *map(",".join, zip(times, body, strict=True))])
 
 
 def mujoco(joint: str) -> str:
@@ -76,12 +79,12 @@ def tum(header: bool) -> str:
     shifted = [1.5e9 + time for time in TIMES]
     positions = numpy.zeros((len(TIMES), 3)) + run().positions()
     comment = "# timestamp tx ty tz qx qy qz qw\n" if header else ""
-    return HEAD + comment + rows(shifted, positions, quaternions()[:, [1, 2, 3, 0]], separator=" ")
+    return HEAD + comment + rows(shifted, positions, scalar_last(), separator=" ")
 
 
 def ephemeris() -> str:
     meta = "ATTITUDE_TYPE = QUATERNION\nQUATERNION_TYPE = LAST\nATTITUDE_DIR = A2B"
-    body = rows(quaternions()[:, [1, 2, 3, 0]], separator=" ").splitlines()
+    body = rows(scalar_last(), separator=" ").splitlines()
     lines = [f"2026-001T00:00:{time:04.1f} {line}" for time, line in zip(TIMES, body, strict=True)]
     comments = HEAD.replace("# ", "COMMENT ")
     parts = ("CCSDS_AEM_VERS = 1.0", comments, "META_START", meta, "META_STOP", "DATA_START", *lines, "DATA_STOP")
@@ -113,7 +116,6 @@ FORMS: dict[str, tuple[str, Callable[[], str]]] = {
         "csv",
         lambda: HEAD + "# attitude: rotation vector\nt,rx,ry,rz\n" + rows(TIMES, vectors()),
     ),
-    "ROS": ("csv", ros),
     "MuJoCo, free joint": ("csv", lambda: mujoco("free")),
     "MuJoCo, ball joint": ("csv", lambda: mujoco("ball")),
     "TUM": ("txt", lambda: tum(True)),
@@ -134,13 +136,6 @@ FORMS: dict[str, tuple[str, Callable[[], str]]] = {
 }
 
 
-def exported(stamp: str, times: Sequence[str], prefix: str, mark: str, rate: str) -> str:
-    names = [f"{prefix}orientation{mark}{a}" for a in "xyzw"] + [f"{prefix}{rate}{mark}{a}" for a in "xyz"]
-    body = rows(quaternions()[:, [1, 2, 3, 0]], omegas()).splitlines()
-    lines = [f"{time},{line}" for time, line in zip(times, body, strict=True)]
-    return HEAD + "\n".join([",".join([stamp, *names]), *lines])
-
-
 def rated(kind: str, more: str) -> str:
     """The message with rates in deg/s, in the axes that ``more`` names."""
     lines = ephemeris().replace("ATTITUDE_TYPE = QUATERNION", f"ATTITUDE_TYPE = {kind}\n{more}").splitlines()
@@ -151,33 +146,48 @@ def rated(kind: str, more: str) -> str:
 
 
 NANO = [f"{17 * 10**17 + k * 10**8}" for k in range(11)]
+SPLIT = [f"{1700000000 + k // 10},{k % 10 * 100000000}" for k in range(11)]
 BASILISK = ",".join(f"{name}[{k}]" for name in ("sigma_BN", "omega_BN_B") for k in range(3))
 TO_BODY = "REF_FRAME_A = EME2000\nREF_FRAME_B = SC_BODY_1\nRATE_FRAME = REF_FRAME_B"
 FROM_BODY = "ATTITUDE_DIR = B2A\nREF_FRAME_A = SC_BODY_1\nREF_FRAME_B = ICRF"
 FORMS |= {
-    "rostopic": ("csv", lambda: exported("%time", NANO, "field.", ".", "angular_velocity")),
-    "PlotJuggler": ("csv", lambda: exported("__time", list(map(str, TIMES)), "/imu/", "/", "angular_velocity")),
-    "milliseconds": ("csv", lambda: exported("time_ms", [str(100 * k) for k in range(11)], "pose_", "_", "angular")),
+    "ROS": ("csv", lambda: exported("stamp.sec,stamp.nanosec", SPLIT, "pose.orientation.", "twist.angular.")),
+    "rostopic": ("csv", lambda: exported("%time", NANO, "field.orientation.", "field.angular_velocity.")),
+    "PlotJuggler": (
+        "csv",
+        lambda: exported("__time", list(map(str, TIMES)), "/imu/orientation/", "/imu/angular_velocity/"),
+    ),
+    "milliseconds": (
+        "csv",
+        lambda: exported("time_ms", [str(100 * k) for k in range(11)], "pose_orientation_", "pose_angular_"),
+    ),
     "Basilisk": ("csv", lambda: f"{HEAD}time,{BASILISK}\n{rows(TIMES, mrp(), omegas())}"),
     "ephemeris with rates": ("aem", lambda: rated("QUATERNION/RATE", TO_BODY)),
     "ephemeris from the body": ("aem", lambda: ephemeris().replace("ATTITUDE_DIR = A2B", FROM_BODY)),
 }
 
 
-def scored(path: Path, *options: str) -> dict[str, object]:
+def digits(path: Path, text: str = "", *options: str) -> float:
+    """The right digits of a file, of which this is the text if it is not there."""
+    if text:
+        path.write_text(text)
     done = heavytop("score", path, "--json", *options)
     assert done.returncode in (0, 1), done.stderr
-    return json.loads(done.stdout)
+    return json.loads(done.stdout)["digits_right"]
+
+
+def refusal(path: Path, text: str) -> str:
+    path.write_text(text)
+    done = heavytop("score", path)
+    assert done.returncode == 2
+    return done.stderr
 
 
 @pytest.mark.parametrize("name", FORMS)
 def test_every_form_of_one_motion_is_right(name: str, tmp_path: Path) -> None:
     suffix, text = FORMS[name]
-    path = tmp_path / f"log.{suffix}"
-    path.write_text(text())
-    document = scored(path)
-    digits = 6 if name.startswith("TUM") else 13  # epochs of 1.5e9 s in double have 2e-7 s
-    assert document["digits_right"] > digits, document  # type: ignore[operator]
+    # epochs of 1.5e9 s in double have 2e-7 s
+    assert digits(tmp_path / f"log.{suffix}", text()) > (6 if name.startswith("TUM") else 13)
 
 
 def test_arrays_of_numpy_are_a_table(tmp_path: Path) -> None:
@@ -185,13 +195,14 @@ def test_arrays_of_numpy_are_a_table(tmp_path: Path) -> None:
     comments = {"mass": "2", "gravity": "9.81", "about": "centre of mass"}
     lists = {"centre": [0.3, -0.2, 0.4], "inertia": [1.2, 0.9, 0.6], "omega": [1, 2, 6]}
     texts = {key: numpy.array(", ".join(map(str, value))) for key, value in lists.items()}
-    numpy.savez(path, t=TIMES, quaternions=quaternions(), **comments, **texts)  # type: ignore[arg-type]
-    assert scored(path)["digits_right"] > 13  # type: ignore[operator]
-    numpy.savez(path, t=TIMES, q=quaternions()[:, [1, 2, 3, 0]], quaternion_order="xyzw", **comments, **texts)  # type: ignore[arg-type]
-    assert scored(path)["digits_right"] > 13  # type: ignore[operator]
     whole = {"mass": 2, "gravity": 9.81, "about": "centre of mass", **lists, "inertia": numpy.diag(lists["inertia"])}
-    numpy.savez(path, time=TIMES, R=run().matrices(), **whole)  # type: ignore[arg-type]
-    assert scored(path)["digits_right"] > 13  # type: ignore[operator]
+    for arrays in (
+        {"t": TIMES, "quaternions": quaternions(), **comments, **texts},
+        {"t": TIMES, "q": scalar_last(), "quaternion_order": "xyzw", **comments, **texts},
+        {"time": TIMES, "R": run().matrices(), **whole},
+    ):
+        numpy.savez(path, **arrays)
+        assert digits(path) > 13
 
 
 @pytest.mark.parametrize("name", ["empty.npz", "zero.npy", "cut.npz", "none.npy", "cut.parquet", "ragged.parquet"])
@@ -221,7 +232,7 @@ def test_a_parquet_table_may_hold_instants_lists_and_the_body(tmp_path: Path) ->
     stamps = pyarrow.array(map(int, NANO), pyarrow.timestamp("ns"))
     table = pyarrow.table({"header_stamp": stamps, "orientation": quaternions().tolist()})
     parquet.write_table(table.replace_schema_metadata(said), path := tmp_path / "log.parquet")
-    assert scored(path)["digits_right"] > 13  # type: ignore[operator]
+    assert digits(path) > 13
 
 
 def plain(lines: Sequence[str]) -> str:
@@ -231,13 +242,9 @@ def plain(lines: Sequence[str]) -> str:
 def test_repeated_times_are_one_row_or_an_error_and_a_reset_ends_the_log(tmp_path: Path) -> None:
     lines = rows(TIMES, quaternions()).splitlines()
     path = tmp_path / "log.csv"
-    path.write_text(plain([*lines[:5], lines[4], *lines[5:]]))
-    assert scored(path)["digits_right"] > 13  # type: ignore[operator]
+    assert digits(path, plain([*lines[:5], lines[4], *lines[5:]])) > 13
     other = lines[4].replace(",0.", ",-0.", 1)
-    path.write_text(plain([*lines[:5], other, *lines[5:]]))
-    refused = heavytop("score", path)
-    assert refused.returncode == 2
-    assert "Lines 12 and 13 are of one time and differ" in refused.stderr
+    assert "Lines 12 and 13 are of one time and differ" in refusal(path, plain([*lines[:5], other, *lines[5:]]))
     path.write_text(plain([*lines[:8], *lines[:3]]))
     shown = heavytop("score", path)
     assert shown.returncode == 0
@@ -245,11 +252,7 @@ def test_repeated_times_are_one_row_or_an_error_and_a_reset_ends_the_log(tmp_pat
     for require, code, says in (("9", 3, "not known, for the time goes back at line 16"), ("17", 1, " are right.")):
         shown = heavytop("score", path, "--require", require)
         assert (shown.returncode, says in shown.stdout) == (code, True)
-    assert scored_or_unknown(path, "9")["passed"] is None
-
-
-def scored_or_unknown(path: Path, require: str) -> dict[str, object]:
-    return json.loads(heavytop("score", path, "--json", "--require", require).stdout)
+    assert json.loads(heavytop("score", path, "--json", "--require", "9").stdout)["passed"] is None
 
 
 def test_stamps_in_double_say_how_many_digits_of_the_time_they_keep(tmp_path: Path) -> None:
@@ -289,19 +292,18 @@ def test_a_table_without_a_header_and_one_of_a_longer_comment(tmp_path: Path) ->
     """Of EuRoC: nanoseconds since 1970, units in brackets, columns beside; and `ros2 topic echo --csv`."""
     named = "#timestamp [ns],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z [],v_RS_R_x [m s^-1]\n"
     body = [f"{time},{line},0" for time, line in zip(NANO, rows(quaternions()).splitlines(), strict=True)]
-    (path := tmp_path / "log.csv").write_text(HEAD + named + "\n".join(body))
-    assert scored(path)["digits_right"] > 13  # type: ignore[operator]
-    path.write_text(HEAD + "\n".join(f"{k},imu,0,0,0,0,1" for k in range(11)))
-    assert "'imu' of the first row is not a number" in heavytop("score", path).stderr
+    path = tmp_path / "log.csv"
+    assert digits(path, HEAD + named + "\n".join(body)) > 13
+    unnamed = HEAD + "\n".join(f"{k},imu,0,0,0,0,1" for k in range(11))
+    assert "'imu' of the first row is not a number" in refusal(path, unnamed)
 
 
 def test_rows_of_one_time_are_one_where_they_agree_to_the_digits_printed(tmp_path: Path) -> None:
     lines = rows(TIMES, quaternions()).splitlines()
     short = ",".join([lines[4].partition(",")[0], *(f"{float(text):.8f}" for text in lines[4].split(",")[1:])])
-    (path := tmp_path / "log.csv").write_text(plain([*lines[:4], short, *lines[4:]]))
-    assert scored(path)["digits_right"] > 13  # type: ignore[operator]
-    path.write_text(plain([*lines[:5], short[:-1] + "99", *lines[5:]]))
-    assert "of one time and differ" in heavytop("score", path).stderr
+    path = tmp_path / "log.csv"
+    assert digits(path, plain([*lines[:4], short, *lines[4:]])) > 13
+    assert "of one time and differ" in refusal(path, plain([*lines[:5], short[:-1] + "99", *lines[5:]]))
 
 
 @pytest.mark.parametrize(
@@ -315,12 +317,8 @@ def test_rows_of_one_time_are_one_where_they_agree_to_the_digits_printed(tmp_pat
     ],
 )
 def test_half_a_file_is_never_scored(names: str, says: str, tmp_path: Path) -> None:
-    path = tmp_path / "log.csv"
     columns = [quaternions()] * (1 + (names.count(",") > 4))
-    path.write_text(HEAD + names + "\n" + rows(TIMES, *columns))
-    refused = heavytop("score", path)
-    assert refused.returncode == 2
-    assert says in refused.stderr
+    assert says in refusal(tmp_path / "log.csv", HEAD + names + "\n" + rows(TIMES, *columns))
 
 
 @pytest.mark.parametrize(("unit", "code"), [("", 2), (" [us]", 0)])
@@ -339,13 +337,11 @@ def test_of_a_free_body_omega_alone_is_scored_and_its_fall_is_left_out(tmp_path:
     free = ht.propagate(body, start, [str(time) for time in TIMES], ht.DOUBLE)
     head = HEAD.replace("9.81", "0").replace("# centre: 0.3, -0.2, 0.4\n", "")
     falling = numpy.outer(TIMES, (1, 2, 3))
-    path = tmp_path / "log.csv"
     for text in (
         "t,omega1,omega2,omega3\n" + rows(TIMES, free.to_numpy()[:, :3]),
         "t,px,py,pz,qw,qx,qy,qz\n" + rows(TIMES, falling, free.quaternions()),
     ):
-        path.write_text(head + text)
-        assert scored(path)["digits_right"] > 13  # type: ignore[operator]
+        assert digits(tmp_path / "log.csv", head + text) > 13
 
 
 def test_stamps_of_a_start_that_is_given_are_counted_from_it(tmp_path: Path) -> None:
@@ -363,6 +359,4 @@ def test_stamps_of_a_start_that_is_given_are_counted_from_it(tmp_path: Path) -> 
 
 
 def test_rows_of_kitti_are_refused_with_the_line_that_names_them(tmp_path: Path) -> None:
-    path = tmp_path / "poses.txt"
-    path.write_text(HEAD + "1 0 0 0 0 1 0 0 0 0 1 0\n")
-    assert "t R11 R12 R13 px R21" in heavytop("score", path).stderr
+    assert "t R11 R12 R13 px R21" in refusal(tmp_path / "poses.txt", HEAD + "1 0 0 0 0 1 0 0 0 0 1 0\n")
