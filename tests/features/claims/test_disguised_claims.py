@@ -10,10 +10,9 @@ import sympy
 import disguised_claims as disguised
 from heavytop.errors import InputError
 from heavytop.features.claims.algebra.combinations import nonnegative_combination
-from heavytop.features.claims.algebra.conditions import solve_relations
 from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.structure import Defined, at_values, rate_along
-from support.claim_algebra import A, B, C, P, Q, T, sign_of, vanishes
+from support.claim_algebra import A, B, P, Q, T, sign_of, vanishes
 from support.claim_tables import Table, audited, energy, integral, top, upright
 
 ENERGY = "(3*Omega1^2 + 2*Omega2^2 + Omega3^2)"
@@ -89,38 +88,6 @@ def test_a_combination_adds_up_and_has_no_negative_weight(target, columns, weigh
 
 
 # --- relations ------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("relation", "symbol", "value"),
-    [
-        (A**3 - 1, A, 1),
-        (A**2 - 1, None, None),
-        (P**2 - 4, P, 2),
-        (P**3 - P, P, 1),
-        (A**3 - A, None, None),
-        (A**3 - B**3, B, A),
-        (A**2 - B**2, None, None),
-        (P**2 - Q**2, Q, P),
-        (A**4 - B**4, None, None),
-        (A**5 + B**5, B, -A),
-        ((A - B + C) * (A**2 + A * B + B**2), None, None),
-        ((A - B) * (A**2 + C**2), None, None),
-        (A**2 + P**2 - 1, P, sympy.sqrt(1 - A**2)),
-        (A**2 + B**2 - 1, None, None),
-        (A * B - 1, None, None),
-        (P * B - 1, B, 1 / P),
-    ],
-)
-def test_a_relation_is_solved_where_it_has_one_solution(relation, symbol, value):
-    found = solve_relations([relation], Assumptions(T, (P, Q)), [A, B, C, P, Q])
-    if symbol is None:
-        assert found == ()
-    else:
-        (solution,) = found
-        difference = {solution.symbol: solution.value}
-        assert {str(solution.symbol)} <= {str(s) for s in relation.free_symbols}
-        assert sympy.simplify((symbol - value).subs(difference)) == 0
 
 
 @pytest.mark.slow

@@ -25,7 +25,7 @@ from heavytop.features.claims.algebra.signs import Sign
 from heavytop.features.claims.algebra.statement import AFTER, ALL, BEFORE, Domain, Flow, Formulas, Statement
 from heavytop.features.claims.algebra.structure import sign_of as sign_by_structure
 from heavytop.features.claims.audit.judge import judge
-from support.claim_algebra import A, P, T, region_of, setting, sign_of, statement
+from support.claim_algebra import A, P, Q, T, region_of, setting, sign_of, statement
 from support.claim_tables import audited, integral, top
 
 TINY = Fraction(1, 10**200)
@@ -131,7 +131,11 @@ def test_every_part_of_a_formula_is_asked(expression: sympy.Expr, needs: set[str
         (sympy.sqrt(T) - 2, 4 + TINY, None),
         (sympy.sqrt(T) - sympy.sqrt(2), 2, True),
         (sympy.sin(T) ** 2 + sympy.cos(T) ** 2 - 1, 1, True),
+        (T**2 - 4, 2 + Fraction(1, 10**400), False),
+        (sympy.sqrt(3 + 2 * T) - 1 - T, Fraction(1, 10**300), False),
+        (sympy.sqrt(T), 0, True),
         # nobody knows: undefined, not real, or 0 to no more than a ball
+        (sympy.sqrt(T), -1, None),
         (sympy.sqrt(1 - T) * (T - 2), 2, None),
         (sympy.log(T - 1) * (T - 1), 1, None),
         (sympy.log(T * 6) - sympy.log(2) - sympy.log(3) + sympy.Rational(1, 10**200), 1, None),
@@ -186,6 +190,18 @@ SIN, COS, ROOT = sympy.sin(T), sympy.cos(T), sympy.sqrt(1 + T**2)
         (sympy.sqrt(3 + 2 * sympy.sqrt(2)) - 1 - sympy.sqrt(2), 0, (1, False)),
         (sympy.exp(T) + sympy.exp(-T) - 2, 0, (1, False)),
         (sympy.tanh(T) + 1, 0, (1, True)),
+        (T**4 - T**2 + 1, 0, (1, True)),
+        (T**2 + 2 * T + 1 - Fraction(1, 10**30), 0, (0, False)),
+        (5 - 4 * COS * sympy.sin(A), 0, (1, True)),
+        (sympy.exp(2 * T) - sympy.exp(T) + 1, 0, (1, True)),
+        (sympy.sqrt(T**2 + P) + sympy.sqrt(T**2), 0, (1, True)),
+        (2 + sympy.atan(T), 0, (1, True)),
+        (sympy.sqrt(2) + sympy.sqrt(3) - sympy.pi, 0, (1, True)),
+        (sympy.sqrt(2) + sympy.sqrt(3) - sympy.pi - sympy.Rational(1, 200), 0, (-1, True)),
+        (P * T**2 - P * T + P, 0, (1, True)),
+        (1 + SIN * COS, 0, (1, True)),
+        (1 + 2 * SIN * COS, 0, (1, False)),
+        (P - Q, 0, (0, False)),
         # arcs go to pi and pi/2, which lie between 3 and 22/7
         (sympy.acos(SIN) - 3, 0, (0, False)),
         (sympy.acos(SIN) - sympy.Rational(22, 7), 0, (-1, False)),
@@ -194,7 +210,7 @@ SIN, COS, ROOT = sympy.sin(T), sympy.cos(T), sympy.sqrt(1 + T**2)
     ],
 )
 def test_a_sign_is_what_it_is_or_unknown_and_strict_only_where_it_is_never_0(expression, sign, expected) -> None:
-    value, strict = sign_of(expression, variable_sign=sign)
+    value, strict = sign_of(sympy.sympify(expression), variable_sign=sign)
     assert value in (expected[0], 0)
     assert strict <= expected[1]
     if expected[1]:

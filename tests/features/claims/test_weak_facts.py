@@ -12,7 +12,7 @@ from heavytop.features.claims.algebra.ring import used
 from heavytop.features.claims.algebra.signs import Sign
 from heavytop.features.claims.algebra.statement import Flow, Setting
 from heavytop.features.claims.audit.context import STATE
-from support.claim_algebra import SYMBOLS, A, B, C, D, E, P, T, sign_of, statement
+from support.claim_algebra import SYMBOLS, A, B, C, D, E, P, Q, T, sign_of, statement
 
 UNKNOWN, NONNEGATIVE, POSITIVE = Sign(0, False), Sign(1, False), Sign(1, True)
 
@@ -69,22 +69,38 @@ def test_a_parameter_that_may_be_0_parts_a_proof_in_two():
 
 
 @pytest.mark.parametrize(
-    ("relation", "facts", "weak", "solved"),
+    ("relation", "known", "symbol", "value"),
     [
-        (A * B + C * D, (), (), None),
-        (A * B + C, (), (), C),
-        (A**2 + B**2 - 1, (B,), (), B),
-        (A**2 + B**2 - 1, (), (B,), None),
-        (B - sympy.sqrt(B + 3), (), (), None),
-        ((A**2 + B**2) * (C - 1), (), (), None),
-        ((A**2 + B**2 + 1) * (C - 1), (), (), C),
-        ((A**2 - 2 * B**2) * A, (), (), None),
-        ((A**2 + 2 * B**2) * A, (), (), A),
+        (A**3 - 1, {}, A, 1),
+        (P**2 - 4, {}, P, 2),
+        (P**3 - P, {}, P, 1),
+        (A**3 - B**3, {}, B, A),
+        (P**2 - Q**2, {}, Q, P),
+        (A**5 + B**5, {}, B, -A),
+        (A**2 + P**2 - 1, {}, P, sympy.sqrt(1 - A**2)),
+        (P * B - 1, {}, B, 1 / P),
+        (A * B + C, {}, C, -A * B),
+        (A**2 + B**2 - 1, {"facts": (B,)}, B, sympy.sqrt(1 - A**2)),
+        ((A**2 + B**2 + 1) * (C - 1), {}, C, 1),
+        ((A**2 + 2 * B**2) * A, {}, A, 0),
+        (A**2 - 1, {}, None, None),
+        (A**3 - A, {}, None, None),
+        (A**2 - B**2, {}, None, None),
+        (A**4 - B**4, {}, None, None),
+        ((A - B + C) * (A**2 + A * B + B**2), {}, None, None),
+        ((A - B) * (A**2 + C**2), {}, None, None),
+        ((A**2 + B**2) * (C - 1), {}, None, None),
+        (A**2 + B**2 - 1, {"weak": (B,)}, None, None),
+        (A * B - 1, {}, None, None),
+        (A * B + C * D, {}, None, None),
+        (B - sympy.sqrt(B + 3), {}, None, None),
+        ((A**2 - 2 * B**2) * A, {}, None, None),
     ],
 )
-def test_a_relation_is_solved_where_the_solution_is_the_whole_of_it(relation, facts, weak, solved):
-    found = solve_relations([relation], Assumptions(T, facts=facts, weak=weak), SYMBOLS)
-    assert [solution.symbol for solution in found] == ([] if solved is None else [solved])
+def test_a_relation_is_solved_where_the_solution_is_the_whole_of_it(relation, known, symbol, value):
+    found = solve_relations([relation], Assumptions(T, (P, Q), **known), [*SYMBOLS, P, Q])
+    assert [solution.symbol for solution in found] == ([] if symbol is None else [symbol])
+    assert all(sympy.simplify(solution.value - value) == 0 for solution in found)
 
 
 @pytest.mark.parametrize(
