@@ -8,14 +8,12 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import heavytop as ht
-from heavytop.cli.app import app
 from heavytop.errors import InputError, OutOfReach
+from support.helpers import START, TOP
+from support.in_process import heavytop
 
-TOP = ht.HeavyTop(inertia=(3, 2, 1), weight=1, centre=("1/2", "1/3", "1/5"))
-START = ht.State(omega=("1/10", "2/5", "9/10"), gamma=("3/5", 0, "4/5"))
 TIMES = [1, "3/2"]
 DATA = ["--inertia", "3,2,1", "--weight", "1", "--centre", "1/2,1/3,1/5", "--omega", "1/10,2/5,9/10"]
 COMMAND = ["reference", *DATA, "--gamma", "3/5,0,4/5", "--times", "0,1", "--digits", "20"]
@@ -136,26 +134,25 @@ def test_what_nobody_waits_for_is_out_of_reach():
 @pytest.mark.slow
 def test_the_command_line_prints_every_entry_at_80_columns(monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
-    shown = CliRunner().invoke(app, [*COMMAND, "--derivatives", "all"])
-    assert shown.exit_code == 0, shown.output
-    assert max(map(len, shown.output.splitlines())) <= 80
+    shown = heavytop(*COMMAND, "--derivatives", "all")
+    assert shown.returncode == 0, shown.stderr
+    assert max(map(len, shown.stdout.splitlines())) <= 80
     for entry in ("∂Ω1/∂Ω1(0)", "∂γ3/∂γ3(0)", "∂Ω1/∂I1", "∂γ3/∂n3", "finite-time Lyapunov exponent"):
-        assert entry in shown.output
+        assert entry in shown.stdout
 
 
 def test_the_json_has_the_key_and_no_other():
-    found = json.loads(CliRunner().invoke(app, [*COMMAND, "--derivatives", "start", "--json"]).stdout)
+    found = json.loads(heavytop(*COMMAND, "--derivatives", "start", "--json").stdout)
     assert set(found["derivatives"]) == {"method", "start", "lyapunov"}
     assert found["derivatives"]["method"].startswith("validated")
     assert np.array(found["derivatives"]["start"]).shape == (2, 6, 6)
     assert found["derivatives"]["lyapunov"][0] is None
-    assert "derivatives" not in json.loads(CliRunner().invoke(app, [*COMMAND, "--json"]).stdout)
+    assert "derivatives" not in json.loads(heavytop(*COMMAND, "--json").stdout)
 
 
 def test_a_word_that_is_none_ends_with_cause_and_remedy():
-    shown = CliRunner().invoke(app, [*COMMAND, "--derivatives", "gamma"])
-    assert isinstance(shown.exception, InputError)
-    assert '"start", "data" or "all"' in str(shown.exception)
+    shown = heavytop(*COMMAND, "--derivatives", "gamma")
+    assert (shown.returncode, '"start", "data" or "all"' in shown.stderr) == (2, True)
 
 
 def _tilted(centre=("1/2", "1/3", "1/5"), omega=("1/10", "2/5", "9/10")):

@@ -7,9 +7,8 @@ from typing import Any
 import pytest
 
 import heavytop as ht
+from support.helpers import START, TOP
 
-TOP = ht.HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
-START = ht.State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
 UNTIL = 8
 Sampled = Callable[[Any, Any], Any]
 CROSSINGS = list(ht.events(TOP, START, UNTIL, "gamma1").times)
@@ -64,9 +63,3 @@ def test_the_branch_cut_of_atan2_is_no_event_in_any_format() -> None:
         right = [float(t) for t, s in zip(exact_angle.times, exact_angle.states, strict=True) if s[3] > 0]
         assert [float(time) for time in events.times] == pytest.approx(right, abs=1e-6)
         assert {kind for _, kind in events.discontinuities} == {"jump"}
-
-
-def test_a_pole_of_a_rational_function_is_no_event() -> None:
-    assert (
-        len(ht.events(TOP, START, UNTIL, "1/gamma1")) == len(ht.events(TOP, START, UNTIL, "1/gamma1", digits=20)) == 0
-    )

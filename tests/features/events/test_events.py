@@ -20,11 +20,17 @@ from heavytop.features.events.located import locate
 from heavytop.integrate.dense import Dense, Piece
 from heavytop.integrate.trajectory import Problem
 from heavytop.top.equations import HEAVY_TOP
+from support.helpers import START, TOP
 
-TOP = ht.HeavyTop(inertia=(3, 2, 1), weight=1, centre=("1/2", "1/3", "1/5"))
-START = ht.State(omega=("1/10", "2/5", "9/10"), gamma=("3/5", 0, "4/5"))
 PENDULUM = ht.HeavyTop((1, 1, 1), 1, (1, 0, 0))
+AT_REST = ht.State((0, 0, 0), ("-3/5", "4/5", 0))
+TURNING = ht.HeavyTop((2, 2, 1), 0, (0, 0, 0)), ht.State((0, 0, 1), (1, 0, 0))  # γ = (cos t, −sin t, 0)
 FUNCTIONS = ("omega1 = 1/5", "gamma3 = 1/2", "omega1*gamma2 - omega2*gamma1 = 1/10", "omega3/(gamma1 + 2) = 1/5")
+
+
+def floats(found) -> np.ndarray:
+    """The times of computed events, and of proven ones."""
+    return found.times_numpy() if hasattr(found, "times_numpy") else found.times
 
 
 def value(name: str, y):
@@ -114,15 +120,14 @@ def test_the_state_lies_on_the_section_to_rounding() -> None:
 @pytest.mark.slow
 def test_the_pendulum_has_the_events_of_its_elliptic_functions() -> None:
     # from rest at sin(θ/2) = k it passes the bottom at K, 3K, 5K, ... (unit frequency)
-    start = ht.State((0, 0, 0), ("-3/5", "4/5", 0))
-    known = ht.events(PENDULUM, start, 20, "gamma2", digits=40)
+    known = ht.events(PENDULUM, AT_REST, 20, "gamma2", digits=40)
     with mpmath.workdps(50):
         quarter = mpmath.ellipk((1 - mpmath.mpf(3) / 5) / 2)
         assert len(known) == int((20 / quarter + 1) / 2) > 4
         for n, ball in enumerate(known.times):
             assert abs(mpmath.mpf(ball.value) - (2 * n + 1) * quarter) <= mpmath.mpf(ball.radius)
     assert known.directions == [(-1) ** (n + 1) for n in range(len(known))]
-    computed = ht.events(PENDULUM, start, 2000, "gamma2")
+    computed = ht.events(PENDULUM, AT_REST, 2000, "gamma2")
     expected = (2 * np.arange(len(computed)) + 1) * float(quarter)
     assert len(computed) > 500
     assert abs(computed.times - expected).max() < 1e-10
@@ -131,12 +136,10 @@ def test_the_pendulum_has_the_events_of_its_elliptic_functions() -> None:
 def test_the_start_on_a_section_is_no_event() -> None:
     for until in (10, -10):
         # Ω3 = 0 at rest: the first return is half a period later
-        start = ht.State((0, 0, 0), ("-3/5", "4/5", 0))
         half = 2 * float(mpmath.ellipk(0.2))
         for digits in (None, 20):
-            found = ht.events(PENDULUM, start, until, "omega3", digits=digits)
-            times = found.times if digits is None else found.times_numpy()
-            assert abs(np.abs(times) - half * np.arange(1, len(found) + 1)).max() < 1e-13
+            found = ht.events(PENDULUM, AT_REST, until, "omega3", digits=digits)
+            assert abs(np.abs(floats(found)) - half * np.arange(1, len(found) + 1)).max() < 1e-13
             assert len(found) == 3
 
 
@@ -167,8 +170,7 @@ def test_two_roots_a_millionth_apart_inside_a_step_are_both_found(integrator) ->
     for digits in (None, 20):
         options = {"digits": digits} if digits else {"integrator": integrator}
         found = ht.events(TOP, START, near + 1, function, **options)
-        times = found.times if digits is None else found.times_numpy()
-        close = [t for t in times if abs(t - near) < 1e-5]
+        close = [t for t in floats(found) if abs(t - near) < 1e-5]
         assert len(close) == 2
         assert 0.9e-6 < close[1] - close[0] < 1.1e-6
     # one sample in the middle of each step sees neither: the fault that this guards against
@@ -188,33 +190,29 @@ def test_two_roots_in_balls_at_a_distance_of_1e_minus_20() -> None:
 
 @pytest.mark.slow
 def test_a_function_that_only_touches_zero_is_undecided_by_name() -> None:
-    start = ht.State((0, 0, 0), ("-3/5", "4/5", 0))
     with pytest.raises(OutOfReach, match=r"Near t = 3\.31.* whether the function changes sign or only touches"):
-        ht.events(PENDULUM, start, 5, "gamma1 = -3/5", digits=15)
+        ht.events(PENDULUM, AT_REST, 5, "gamma1 = -3/5", digits=15)
     # a change of sign at the end of the run itself cannot be distinguished from one behind it
-    at_end = Fraction(ht.events(PENDULUM, start, 3, "gamma2", digits=400).times[0].value)
+    at_end = Fraction(ht.events(PENDULUM, AT_REST, 3, "gamma2", digits=400).times[0].value)
     with pytest.raises(OutOfReach, match="before the end of the run"):
-        ht.events(PENDULUM, start, at_end, "gamma2", digits=15)
+        ht.events(PENDULUM, AT_REST, at_end, "gamma2", digits=15)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("digits", [None, 20])
 def test_powers_change_sign_where_their_bases_do_or_never(digits) -> None:
-    free, start = ht.HeavyTop((2, 2, 1), 0, (0, 0, 0)), ht.State((0, 0, 1), (1, 0, 0))  # γ = (cos t, −sin t, 0)
     for power in (1, 2, 3, 8):
         for function, first in ((f"gamma1**{power}", math.pi / 2), (f"gamma2^{power}/gamma1**2", math.pi)):
-            found = ht.events(free, start, 6, function, digits=digits)
-            times = found.times if digits is None else found.times_numpy()
-            expected = np.arange(first, 6, math.pi) if power % 2 else []
+            found = ht.events(*TURNING, 6, function, digits=digits)
+            times, expected = floats(found), (np.arange(first, 6, math.pi) if power % 2 else [])
             assert len(times) == len(expected)
             assert np.allclose(times, expected, rtol=0, atol=1e-13)
 
 
 @pytest.mark.slow
 def test_a_zero_of_third_order_that_is_no_power_is_undecided() -> None:
-    free, start = ht.HeavyTop((2, 2, 1), 0, (0, 0, 0)), ht.State((0, 0, 1), (1, 0, 0))
     with pytest.raises(OutOfReach, match=r"Near t = 3\.14159265359 .* changes sign or only touches"):
-        ht.events(free, start, 4, "(1 + gamma1)*gamma2", digits=2)
+        ht.events(*TURNING, 4, "(1 + gamma1)*gamma2", digits=2)
 
 
 @pytest.mark.slow
@@ -282,14 +280,11 @@ def test_a_sampled_callable_finds_two_close_roots_at_its_minimum() -> None:
     assert len([t for t in found.times if abs(t - near) < 1e-2]) == 2
 
 
-@pytest.mark.slow
 def test_a_pole_is_no_event() -> None:
-    poles = ht.events(TOP, START, 60, "1/gamma2")
-    assert len(poles) == 0
-    assert len(ht.events(TOP, START, 20, "1/gamma2", digits=15)) == 0
-    assert len(ht.events(TOP, START, 60, "gamma2")) > 10
+    assert len(ht.events(TOP, START, 20, "gamma2")) > 3
+    assert len(ht.events(TOP, START, 20, "1/gamma2")) == len(ht.events(TOP, START, 4, "1/gamma2", digits=15)) == 0
     # the sign of the denominator turns the direction
-    plain, over = (ht.events(TOP, START, 20, f, digits=15) for f in ("omega1", "omega1/(gamma2 - 2)"))
+    plain, over = (ht.events(TOP, START, 8, f, digits=15) for f in ("omega1", "omega1/(gamma2 - 2)"))
     assert [-d for d in plain.directions] == over.directions
 
 
@@ -339,13 +334,6 @@ def test_odd_scales_and_names_of_axes() -> None:
     again = ht.State(("9/10", "1/10", "2/5"), ("4/5", "3/5", 0))
     renamed = ht.events(turned, again, 10, "omega2*gamma2 = 1/20", digits=20)
     assert [b.value[:18] for b in renamed.times] == [b.value[:18] for b in plain.times]
-
-
-@pytest.mark.slow
-def test_an_equilibrium_has_no_events() -> None:
-    still = ht.State((0, 0, 0), (1, 0, 0))
-    for options in ({}, {"integrator": "multiword"}, {"digits": 20}):
-        assert len(ht.events(PENDULUM, still, 10, "omega1 = 1", **options)) == 0
 
 
 def test_a_run_that_ends_early_says_so() -> None:
@@ -408,10 +396,9 @@ def test_threads_and_their_callables_do_not_disturb_each_other() -> None:
         found[place] = ht.events(TOP, START, 20, FUNCTIONS[place % 2], digits=20).time_texts()
 
     threads = [Thread(target=work, args=(k,)) for k in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    for step in (Thread.start, Thread.join):
+        for thread in threads:
+            step(thread)
     assert [found[k] for k in range(4)] == alone * 2
     inside = ht.events(
         TOP, START, 3, lambda omega, gamma: float(ht.events(TOP, START, 1, "gamma2").steps) * 0 + omega[0]
@@ -442,9 +429,11 @@ def test_a_section_of_several_starts() -> None:
         section.points("omega7")
 
 
-def test_records_without_events_keep_their_shapes() -> None:
-    for options in ({}, {"digits": 15}):
-        none = ht.events(TOP, START, "1/100", "omega1 = 5", **options)
+@pytest.mark.parametrize("options", [{}, {"integrator": "multiword"}, {"digits": 15}], ids=str)
+def test_records_without_events_keep_their_shapes(options) -> None:
+    """Of a motion, and of an equilibrium."""
+    still = ht.events(PENDULUM, ht.State((0, 0, 0), (1, 0, 0)), 10, "omega1 = 1", **options)
+    for none in (still, ht.events(TOP, START, "1/100", "omega1 = 5", **options)):
         assert len(none) == 0
         assert none.to_numpy().shape == (0, 6)
         assert "0 events" in repr(none)

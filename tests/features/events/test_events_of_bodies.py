@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import heavytop as ht
+from support.helpers import START, TOP
 
-TOP = ht.HeavyTop(inertia=(3, 2, 1), weight=1, centre=("1/2", "1/3", "1/5"))
-START = ht.State(omega=("1/10", "2/5", "9/10"), gamma=("3/5", 0, "4/5"))
 ROWS = [[Fraction(n, 3) for n in row] for row in ((2, -1, 2), (2, 2, -1), (-1, 2, 2))]
 SKEW = ht.Body(1, 1, ("1/2", "1/3", "1/5"), (3, 2, 1, "1/5", 0, "1/7"), about="pivot")
 TILTED = ht.State(omega=("1/10", "2/5", "9/10"), attitude=ht.Attitude.euler("ZXZ", "1/3", "1/2", "1"))

@@ -5,19 +5,17 @@ from __future__ import annotations
 import json
 
 import pytest
-from typer.testing import CliRunner
 
 import heavytop as ht
-from heavytop.cli import app
+from support.helpers import START, TOP
+from support.in_process import heavytop
 
-TOP = ht.HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
-START = ht.State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
 DATA = {"inertia": "3,2,1", "weight": "1", "centre": "1/2,1/3,1/5", "omega": "1/10,2/5,9/10", "gamma": "3/5,0,4/5"}
 OPTIONS = [part for name, value in (DATA | {"times": "1,10"}).items() for part in (f"--{name}", value)]
 
 
 def call(*arguments: str):
-    return CliRunner().invoke(app, [*arguments, *OPTIONS])
+    return heavytop(*arguments, *OPTIONS)
 
 
 @pytest.mark.slow
@@ -25,7 +23,7 @@ def call(*arguments: str):
 def test_propagate_gives_the_events_of_python(integrator: str) -> None:
     asked = "--events", "gamma3=1/2", "--events", "omega1 = 1/5", "--event-direction", "1"
     done = call("propagate", *asked, "--integrator", integrator, "--json")
-    assert done.exit_code == 0, done.output
+    assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
     assert document["times"] == ["1", "10"]
     assert [each["function"] for each in document["events"]] == ["gamma3=1/2", "omega1 = 1/5"]
@@ -58,21 +56,17 @@ def test_reference_gives_balls() -> None:
     ("arguments", "cause"),
     [
         (("propagate", "--events", ""), "is not a function"),
-        (("propagate", "--events", "omega9"), "is not a component"),
-        (("propagate", "--events", "nan"), "is not a component"),
         (("reference", "--events", "omega1=inf"), "is not a component"),
         (("propagate", "--events", "omega1", "--event-direction", "2"), "direction must be a sign; got 2"),
-        (("propagate", "--events", "omega1", "--integrator", "mpmath:odefun"), "hands over no polynomial"),
-        (("propagate", "--events", "gamma1**2 + gamma2**2 + gamma3**2 = 1"), "is zero along this motion"),
+        (("propagate", "--events", "omega1", "--integrator", "scipy:Radau"), "hands over no polynomial"),
     ],
 )
 def test_bad_input_has_a_cause(arguments: tuple[str, ...], cause: str) -> None:
     done = call(*arguments)
-    assert cause in str(done.exception)
-    assert done.exception.exit_code == 2  # type: ignore[union-attr]
+    assert (done.returncode, cause in done.stderr) == (2, True), done.stderr
 
 
 def test_a_run_that_stops_says_how_far_was_looked() -> None:
     done = call("propagate", "--events", "gamma2", "--max-steps", "5")
-    assert done.exit_code == 3
+    assert done.returncode == 3
     assert "Looked up to t = " in done.stdout

@@ -12,10 +12,9 @@ import pytest
 
 import heavytop as ht
 from heavytop.features.limits.power import FAULTS
+from support.helpers import START, TOP
 from support.in_process import heavytop
 
-TOP = ht.HeavyTop(inertia=(3, 2, 1), weight=1, centre=("1/2", "1/3", "1/5"))
-START = ht.State(omega=("1/10", "2/5", "9/10"), gamma=("3/5", 0, "4/5"))
 FLIP = ht.HeavyTop(("919/15000", "967/15000", "83/15000"), 0, (0, 0, 0)), ht.State((10, 0, "1e-10"), (0, 0, 1))
 BODY = ht.Body("2", "9.81", ("0.1", "0", "0.3"), (1, 2, "1.5", "0.1", "-0.1", "0.2"), "pivot")
 SPINNING = ht.State(omega=(1, 2, 3), attitude=ht.Attitude.quaternion(1, 0, 0, 0))
