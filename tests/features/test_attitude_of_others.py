@@ -15,10 +15,11 @@ from heavytop.harness import rows as suite_rows
 from heavytop.harness.checkpoint import Saved
 from heavytop.integrate.registry import described
 from heavytop.precision import exact
-from heavytop.records import NOT_CARRIED, SCHEMA, Report, Row
+from heavytop.records import NOT_CARRIED, Row
 from heavytop.report.compare.noise import Policy
 from heavytop.report.compare.verdicts import Verdict
 from support.reports import compare, read_plan, summary
+from support.small_reports import report
 
 pytestmark = pytest.mark.slow
 
@@ -72,14 +73,10 @@ def measured(folder: Path, function: str = "solve", rate: float = 0.0, numbers: 
     return [suite_rows.measure(KINDS[task.key.kind], task, Saved()) for task in tasks]
 
 
-def report(rows: list[Row]) -> Report:
-    return Report(SCHEMA, {"name": "theirs"}, {}, rows)
-
-
 def shown(rows: list[Row]) -> str:
     console = Console(width=120)
     with console.capture() as captured:
-        console.print(summary(report(rows)))
+        console.print(summary(report(*rows)))
     return captured.get()
 
 
@@ -103,7 +100,7 @@ def test_an_attitude_that_turns_slowly_is_measured_and_a_gate_sees_it(
     # the centre of mass is turned about the vertical, at its distance from it
     assert 0 < float(exact(body.metrics["position_error_max"].value)) <= 2 * rate * (1 + 1e-9)
     assert {"attitude_error", "position_error"} <= growth.laws.keys()
-    gate = compare(report(healthy), report(turned), Policy())
+    gate = compare(report(*healthy), report(*turned), Policy())
     assert gate.verdict == "worse"
     worse = {finding.name.partition("_error")[0] for finding in gate.changed if finding.verdict is Verdict.WORSE}
     assert worse == {"attitude", "position"}

@@ -15,13 +15,14 @@ from heavytop.harness.rows import Find, PlanTable, Task, exact_row
 from heavytop.harness.run import run
 from heavytop.kind import Kind
 from heavytop.measure.scalar import of_fraction
-from heavytop.records import SCHEMA, Against, Beside, Quantity, Report, Row, RowKey, Subject, by_name
+from heavytop.records import Against, Beside, Quantity, Row, RowKey, Subject, by_name
 from heavytop.report.compare.compare import compare
 from heavytop.report.compare.noise import Policy
 from heavytop.report.document.document import Block, Chart, Headline, Section, Sources, Value
 from heavytop.report.document.document import Table as Cells
 from heavytop.report.render.page import report_page
 from heavytop.report.render.terminal import summary
+from support.small_reports import report
 
 WEIGHT = Quantity("toy_weight")
 PLAN = """name = "toys"
@@ -98,10 +99,6 @@ def measured(folder: Path, workers: int = 1, stop_after: int | None = None, kind
         return list(checkpoint.rows(range(len(tasks))))
 
 
-def report(rows: list[Row]) -> Report:
-    return Report(SCHEMA, {"name": "toys"}, {}, rows)
-
-
 def test_a_plan_runs_stops_and_goes_on(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         measured(tmp_path, stop_after=2)
@@ -123,7 +120,7 @@ def test_spawned_workers_know_it_too(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_its_rows_have_their_lines_and_their_section(tmp_path: Path) -> None:
     console = Console(width=100)
-    made = report(measured(tmp_path))
+    made = report(*measured(tmp_path))
     with console.capture() as capture:
         console.print(summary(made, KINDS_WITH_TOY))
     assert "4 toys are weighed." in capture.get()
@@ -139,12 +136,12 @@ def test_its_rows_have_their_lines_and_their_section(tmp_path: Path) -> None:
 
 def test_its_rows_compare(tmp_path: Path) -> None:
     rows, others = measured(tmp_path), measured(tmp_path)
-    assert compare(report(rows), report(others), Policy(), KINDS_WITH_TOY).verdict == "same"
+    assert compare(report(*rows), report(*others), Policy(), KINDS_WITH_TOY).verdict == "same"
 
     class Heavier(Toy):
         spoilt = 1000
 
     worse = measured(tmp_path, kinds={**KINDS, "toy": Heavier()})
-    result = compare(report(rows), report(worse), Policy(), KINDS_WITH_TOY)
+    result = compare(report(*rows), report(*worse), Policy(), KINDS_WITH_TOY)
     assert (result.verdict, len(result.changed)) == ("worse", 4)
-    assert compare(report(rows), report(rows[1:]), Policy(), KINDS_WITH_TOY).verdict == "incomparable"
+    assert compare(report(*rows), report(*rows[1:]), Policy(), KINDS_WITH_TOY).verdict == "incomparable"

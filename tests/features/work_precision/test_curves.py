@@ -6,6 +6,7 @@ from typing import Any
 
 import msgspec
 import pytest
+from rich.console import Console
 
 from heavytop.errors import InputError
 from heavytop.features.kinds import KINDS
@@ -18,46 +19,27 @@ from heavytop.features.work_precision.curves import (
     leads,
     panels,
 )
-from heavytop.records import SCHEMA, Metric, Report, Series
+from heavytop.records import Metric, Series
 from heavytop.report.document.document import Headline
 from heavytop.report.document.svg import quiet_style
 from heavytop.report.render.plots import draw_report
+from support import small_reports
 from support.reports import Row, summary
+from support.small_reports import report
 
 pytestmark = pytest.mark.pictures
 
 KIND = ("svg", "pdf")
 
 
-def row(
-    integrator: str,
-    log10: float | None,
-    seconds: float,
-    *,
-    case: str = "top/T=9",
-    precision: str = "double",
-    outcome: str = "success",
-    compile: float = 0.0,
-) -> Row:
+def row(integrator: str, log10: float | None, seconds: float, *, case: str = "top/T=9", **more: Any) -> Row:
+    """A row of an error and of the least seconds."""
     metrics = {"error_max": Metric("1", log10) if log10 is not None else Metric("missing", None)}
     metrics["error_final"] = Metric("1", None if log10 is None else log10 - 1)
-    series = Series(["1", "2"], ["1e-9", "unresolved"])
-    return Row(
-        case=case,
-        system="heavy_top",
-        integrator=integrator,
-        precision=precision,
-        bits=53,
-        outcome=outcome,
-        horizon="9",
-        time_reached="9",
-        steps=5,
-        finite=True,
-        metrics=metrics,
-        measure="work_precision",
-        seconds={"run": 99.0, "least": seconds, "compile": compile},
-        series={"drift_energy": series, "solution_error_along": series},
-    )
+    series = dict.fromkeys(("drift_energy", "solution_error_along"), Series(["1", "2"], ["1e-9", "unresolved"]))
+    given = {"seconds": {"run": 99.0, "least": seconds, "compile": more.pop("compile", 0.0)}, "series": series} | more
+    common = {"measure": "work_precision", "horizon": "9", "time_reached": "9", "steps": 5, "against": ""}
+    return small_reports.row(case=case, integrator=integrator, metrics=metrics, **common, **given)
 
 
 OURS = [row("heyoka tolerance=1e-8", -8, 1.0), row("heyoka tolerance=1e-12", -12, 4.0)]
@@ -68,20 +50,18 @@ LANES = [row("heyoka:lanes tolerance=eps", -13, 0.001)]
 ALL = OURS + CYRK + SPLITTING + FAILED + LANES
 
 
+def line_of(*points: tuple[int, float]) -> WorkPrecisionLine:
+    return WorkPrecisionLine("x", "double", [WorkPrecisionPoint(*point, "") for point in points])
+
+
 def test_between_rungs_a_straight_line_on_logarithmic_axes() -> None:
-    line = WorkPrecisionLine("x", "double", [WorkPrecisionPoint(-8, 1.0, ""), WorkPrecisionPoint(-12, 100.0, "")])
-    assert line.seconds_at(-10) == pytest.approx(10)
-    assert line.seconds_at(-6) == 1
-    assert line.seconds_at(-12) == pytest.approx(100)
+    line = line_of((-8, 1.0), (-12, 100.0))
+    assert [line.seconds_at(log10) for log10 in (-6, -10, -12)] == pytest.approx([1, 10, 100])
     assert line.seconds_at(-13) is None
 
 
 def test_a_line_that_turns_back_takes_the_least_time() -> None:
-    line = WorkPrecisionLine(
-        "x",
-        "double",
-        [WorkPrecisionPoint(-8, 1.0, ""), WorkPrecisionPoint(-12, 4.0, ""), WorkPrecisionPoint(-9, 50.0, "")],
-    )
+    line = line_of((-8, 1.0), (-12, 4.0), (-9, 50.0))
     assert line.seconds_at(-10) == pytest.approx(2)
     assert line.best == WorkPrecisionPoint(-12, 4.0, "")
 
@@ -125,8 +105,7 @@ def test_constants_that_are_no_gain_or_alone_or_too_coarse_change_no_claim() -> 
 
 @pytest.mark.parametrize(("theirs", "cell"), [(1.92, "1.0"), (1.88, "slower, 0.9"), (2.08, "1.0"), (2.12, "1.1")])
 def test_a_lead_is_called_slower_where_its_printed_digits_are(theirs: float, cell: str) -> None:
-    report = Report(SCHEMA, {"name": "p"}, {}, [*OURS, row("fast:x tolerance=1", -11, theirs)])
-    section = work_precision([("", report)])
+    section = work_precision([("", report(*OURS, row("fast:x tolerance=1", -11, theirs)))])
     assert section is not None
     assert section.answers is not None
     ((*_, times, _, _),) = section.answers.rows
@@ -136,7 +115,7 @@ def test_a_lead_is_called_slower_where_its_printed_digits_are(theirs: float, cel
 def test_no_two_of_many_curves_look_alike() -> None:
     rows = [row(f"x{n} tolerance=1", -8 - n / 2, 0.1 + n) for n in range(17)]
     with quiet_style():
-        section = work_precision([("", Report(SCHEMA, {"name": "p"}, {}, rows))])
+        section = work_precision([("", report(*rows))])
     assert section is not None
     curves = [line for line in section.pictures[0].axes.get_lines() if str(line.get_label()).startswith("x")]
     looks = {(line.get_color(), line.get_marker(), str(line._dash_pattern)) for line in curves}
@@ -152,6 +131,10 @@ def test_an_error_that_nobody_reaches_makes_no_lead() -> None:
     [
         (OURS + SPLITTING, "takes 2 s; no other gets there"),
         (OURS + FAILED, "no other gets there"),
+        (
+            [OURS[0], row("multiword tolerance=eps", -15, 0.5)],
+            "top/T=9: heyoka double at error 1e-10: not reached; the fastest that gets there is multiword (500 ms)",
+        ),
         (OURS[:1] + CYRK, "not reached; the fastest that gets there is cyrk:DOP853 (9 s)"),
         (
             [*OURS, row("fast:x tolerance=1", -11, 0.5)],
@@ -176,12 +159,23 @@ def test_formats_beyond_extended_are_compared_where_double_ends() -> None:
     assert leads(OURS + wide) == both[1:]
 
 
-def test_whoever_is_fastest_is_named() -> None:
-    words = [row(f"multiword tolerance=1e{n}", n, 0.25, precision="double-double") for n in (-25, -31)]
-    heyoka = row("heyoka tolerance=eps", -33, 4.0, precision="quad")
-    (lead,) = leads([heyoka, *words])
-    assert lead.text.startswith("top/T=9: the fastest at error 1e-30 is multiword double-double (250 ms); ")
-    assert lead.short == "At 1e-30 multiword double-double is 16.0 × as fast as heyoka quad"
+@pytest.mark.parametrize(
+    ("rows", "short"),
+    [
+        (
+            [row(f"multiword tolerance=1e{n}", n, 0.25, precision="double-double") for n in (-25, -31)],
+            "multiword double-double is 16.0 × as fast as heyoka quad",
+        ),
+        (
+            [row("multiword tolerance=eps", -34, 0.5, precision="quad")],
+            "multiword quad is 8.0 × as fast as heyoka quad",
+        ),
+    ],
+)
+def test_whoever_is_fastest_is_named(rows: list[Row], short: str) -> None:
+    (lead,) = leads([row("heyoka tolerance=eps", -33, 4.0, precision="quad"), *rows])
+    assert lead.text.startswith(f"top/T=9: the fastest at error 1e-30 is {short.partition(' is')[0]} (")
+    assert lead.short == f"At 1e-30 {short}"
 
 
 def test_cases_formats_and_failures_are_kept_apart() -> None:
@@ -199,11 +193,9 @@ def test_cases_formats_and_failures_are_kept_apart() -> None:
 
 
 def test_the_summary_says_it() -> None:
-    from rich.console import Console
-
     console = Console(width=160)
     with console.capture() as capture:
-        console.print(summary(Report(SCHEMA, {"name": "peers"}, {}, ALL)))
+        console.print(summary(report(*ALL)))
     text = capture.get()
     assert "4.5 × as fast as the best other integrator, cyrk:DOP853" in text
     assert "Failed measurements" not in text
@@ -214,7 +206,7 @@ def test_the_summary_says_it() -> None:
 def drawn(rows: list[Row]) -> Any:
     """Their picture of the page."""
     with quiet_style():
-        (picture,) = work_precision([("", Report(SCHEMA, {}, {}, rows))]).pictures
+        (picture,) = work_precision([("", report(*rows))]).pictures
     return picture
 
 
@@ -258,8 +250,7 @@ def test_who_is_fastest_at_1e_10_opens_the_page() -> None:
 @pytest.mark.slow
 def test_every_picture_is_a_file_as_svg_and_as_pdf(tmp_path: Path) -> None:
     growth = [row(f"{name} tolerance=1e-5", -5, 1.0) for name in ("heyoka", "cyrk:DOP853")] + SPLITTING
-    report = Report(SCHEMA, {}, {}, growth)
-    files = draw_report(report, tmp_path / "new", KINDS)
+    files = draw_report(report(*growth), tmp_path / "new", KINDS)
     names = [file.name for file in files]
     assert names == [f"{stem}.{kind}" for stem in ("work-0", "method-growth-0", "method-growth-1") for kind in KIND]
     for file in files:
@@ -268,15 +259,15 @@ def test_every_picture_is_a_file_as_svg_and_as_pdf(tmp_path: Path) -> None:
         assert len(text) > 4000
     assert "Energy drift over time" in files[2].read_text("utf-8")
     assert "cyrk:DOP853 tolerance=1e-5" in files[2].read_text("utf-8")
-    again = draw_report(report, tmp_path / "again", KINDS)
+    again = draw_report(report(*growth), tmp_path / "again", KINDS)
     assert [file.read_bytes() for file in again] == [file.read_bytes() for file in files]
     with pytest.raises(InputError, match="no row that is drawn"):
-        draw_report(Report(SCHEMA, {}, {}, []), tmp_path / "none", KINDS)
+        draw_report(report(), tmp_path / "none", KINDS)
     assert not (tmp_path / "none").exists()
 
 
 def test_without_such_rows_there_is_no_picture() -> None:
-    assert work_precision([("", Report(SCHEMA, {}, {}, []))]) is None
+    assert work_precision([("", report())]) is None
     assert leads([]) == []
 
 
@@ -284,20 +275,6 @@ def test_a_hostile_name_is_text() -> None:
     rows = [row("<script>alert(1)</script>:x$ tolerance=1", -3, 1.0, case='<b>"&$_{$')]
     assert "<script" not in drawn(rows).svg
     assert "<b>" not in drawn(rows).svg
-
-
-def test_whoever_is_faster_stands_first() -> None:
-    wide = [
-        row("heyoka tolerance=eps", -33, 4.0, precision="quad"),
-        row("multiword tolerance=eps", -34, 0.5, precision="quad"),
-    ]
-    (lead,) = leads(wide)
-    assert lead.short == "At 1e-30 multiword quad is 8.0 × as fast as heyoka quad"
-    (alone,) = leads([OURS[0], row("multiword tolerance=eps", -15, 0.5)])
-    assert (
-        alone.text
-        == "top/T=9: heyoka double at error 1e-10: not reached; the fastest that gets there is multiword (500 ms)"
-    )
 
 
 def test_one_beside_heyoka_is_a_table_with_a_line_a_rung() -> None:
@@ -334,7 +311,7 @@ def test_seconds_that_are_not_resolved_are_printed_as_that_and_compared_with_not
     assert order == ["2.1", "", ""]
     assert leads(rows) == []
     assert fastest([quick]) == Headline("The least error is 1e-11: mine:rk4 on top/T=9, in < 0.1 ms.")
-    section = work_precision([("", Report(SCHEMA, {}, {}, rows))])
+    section = work_precision([("", report(*rows))])
     assert section is not None
     assert [cells[5] for cells in section.rows] == ["1", "4", "< 0.0001", "0.5"]
     assert "1e-12 in 500 ms" in section.pictures[0].description

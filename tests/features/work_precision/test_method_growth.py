@@ -6,11 +6,12 @@ import numpy
 import pytest
 
 from heavytop.features.work_precision.charts import alike, method_growth, trend
-from heavytop.records import SCHEMA, Report, Series
+from heavytop.records import Series
 from heavytop.report.compare.noise import Policy
 from heavytop.report.document.svg import quiet_style
 from support.report_helpers import GROWTH, HOSTILE, LONG, WORK, law, method
 from support.reports import compare, comparison_page
+from support.small_reports import report
 
 pytestmark = pytest.mark.pictures
 
@@ -93,12 +94,12 @@ def test_the_rungs_nearest_to_the_same_error_on_the_longest_run_that_has_all() -
     longer = [method(row.integrator, law(1, 1), law(2, 1), case="y/T=1e5", horizon="1e5") for row in GROWTH[:2]]
     assert alike([*other, *short, *WORK, *longer, *GROWTH]) == GROWTH
     assert alike(GROWTH[:2]) == []
-    assert method_growth([("", Report(SCHEMA, {}, {}, [*WORK, *GROWTH[1:]]))]) is None
+    assert method_growth([("", report(*WORK, *GROWTH[1:]))]) is None
 
 
 def test_the_section_says_each_law_to_eye_and_ear() -> None:
     with quiet_style():
-        section = method_growth([("", Report(SCHEMA, {}, {}, GROWTH))])
+        section = method_growth([("", report(*GROWTH))])
     energy, phase = section.pictures
     assert "splitting:4 step=1/40: bounded, exponent 0.00 (0.00, then 0.00)." in energy.description
     assert "heyoka tolerance=1e-9: like t, exponent 1.00 (1.00, then 1.00)." in energy.description
@@ -112,7 +113,7 @@ def test_the_section_says_each_law_to_eye_and_ear() -> None:
 
 
 def test_the_curves_are_the_series() -> None:
-    section = method_growth([("", Report(SCHEMA, {}, {}, GROWTH))])
+    section = method_growth([("", report(*GROWTH))])
     drawn = section.pictures[0].axes.get_lines()[0]
     assert list(drawn.get_ydata()) == pytest.approx(
         [math.log10(float(v)) for v in GROWTH[0].series["drift_energy"].values]
@@ -122,15 +123,15 @@ def test_the_curves_are_the_series() -> None:
 @pytest.mark.slow
 def test_a_comparison_draws_both_and_a_hostile_case_is_text() -> None:
     rows = [method(r.integrator, *r.series.values(), case=HOSTILE) for r in GROWTH]
-    report = Report(SCHEMA, {"name": "x"}, {}, rows)
-    section = method_growth([("baseline", report), ("candidate", report)])
+    made = report(*rows)
+    section = method_growth([("baseline", made), ("candidate", made)])
     assert [key.old for key in section.legend.values()] == [True] * 3 + [False] * 4
-    page = comparison_page(report, report, compare(report, report, Policy()))
+    page = comparison_page(made, made, compare(made, made, Policy()))
     assert "method-growth" in page
     assert "<script" not in page
 
 
 def test_methods_that_cannot_be_fitted_are_drawn_without_a_law() -> None:
     words = [method(r.integrator, Series(["1", "2"], ["1e-9", "nan"]), Series([], [])) for r in GROWTH]
-    section = method_growth([("", Report(SCHEMA, {}, {}, words))])
+    section = method_growth([("", report(*words))])
     assert section.pictures[0].description.count("too few samples for a law") == 3
