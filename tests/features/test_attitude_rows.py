@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import heavytop as ht
-from support.reports import expand, load, measure
+from support.reports import measure, tasks_of
 
 PLAN = """name = "bodies"
 [[top]]
@@ -40,9 +40,8 @@ runs = [{{ precision = "{precision}", horizon = "2", samples = 20 }}]
 """
 
 
-def plan(folder: Path, **table: str) -> Path:
-    (folder / "plan.toml").write_text(PLAN + TABLE.format(**table), "utf-8")
-    return folder / "plan.toml"
+def plan(**table: str) -> str:
+    return PLAN + TABLE.format(**table)
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +51,7 @@ def rows(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., dict[str, An
     @cache
     def measured(integrator: str, attitude: str) -> dict[str, Any]:
         table = {"integrator": integrator, "precision": "double", "attitude": attitude}
-        tasks = expand(load(str(plan(tmp_path_factory.mktemp("rows"), **table)))[0])
+        tasks = tasks_of(tmp_path_factory.mktemp("rows"), plan(**table))
         return {task.key.case: measure(task) for task in tasks}
 
     return measured
@@ -84,9 +83,8 @@ def test_the_states_are_those_of_a_run_without_attitude_to_rounding(rows: Callab
 @pytest.mark.slow
 def test_the_band_of_a_body_with_a_rotor_is_rounding_noise(tmp_path: Path) -> None:
     """Reruns scale the rotor with the moments: else they are other motions, with bands of many decades."""
-    report = ht.run(
-        plan(tmp_path, integrator="heyoka", precision="double", attitude="true"), out=tmp_path / "out", workers=1
-    )
+    (tmp_path / "plan.toml").write_text(plan(integrator="heyoka", precision="double", attitude="true"), "utf-8")
+    report = ht.run(tmp_path / "plan.toml", out=tmp_path / "out", workers=1)
     (row,) = (each for each in report.rows if each.case == "spinner")
     bands = [
         metric.band for name, metric in row.metrics.items() if name.startswith(("drift", "solution")) and metric.band
@@ -110,8 +108,8 @@ def test_the_band_of_a_body_with_a_rotor_is_rounding_noise(tmp_path: Path) -> No
 def test_a_body_that_is_none_is_refused_by_the_name_of_its_top(
     tmp_path: Path, old: str, new: str, message: str
 ) -> None:
-    table = TABLE.format(integrator="heyoka", precision="double", attitude="true")
-    (tmp_path / "plan.toml").write_text((PLAN + table).replace(old, new, 1), "utf-8")
+    table = plan(integrator="heyoka", precision="double", attitude="true")
+    (tmp_path / "plan.toml").write_text(table.replace(old, new, 1), "utf-8")
     with pytest.raises(ht.InputError, match=message) as refused:
         ht.run(tmp_path / "plan.toml", out=tmp_path / "out")
     assert "'tilted'" in str(refused.value)
@@ -119,12 +117,7 @@ def test_a_body_that_is_none_is_refused_by_the_name_of_its_top(
 
 
 def test_a_plan_reads_the_body_exactly(tmp_path: Path) -> None:
-    from heavytop.features.kinds import KINDS
-    from heavytop.harness.plan import expand, load
-
-    table = TABLE.format(integrator="heyoka", precision="double", attitude="false")
-    (tmp_path / "plan.toml").write_text(PLAN + table, "utf-8")
-    task = next(iter(expand(load(str(tmp_path / "plan.toml"), KINDS)[0])))
+    task = next(iter(tasks_of(tmp_path, plan(integrator="heyoka", precision="double", attitude="false"))))
     assert task.case is not None
     assert task.case.body is not None
     assert task.case.body.tensor[0] == (Fraction(7, 10), Fraction(1, 10), Fraction(-1, 20))

@@ -10,7 +10,7 @@ from heavytop.features.claims import claim_error as module
 from heavytop.features.claims.claim_error import CLOSE, PARTED, divergence_time, exact_claim, true_solution
 from heavytop.features.claims.library.ershkov import PartialCase
 from heavytop.precision import exact
-from support.reports import expand, load, measure
+from support.reports import measure, tasks_of
 
 HORIZON = Fraction(2)
 KNOWN = [(2, "smooth", 1, "0.2014"), (2, "printed", 1, "0.0100"), (2, "printed", -1, "0.2014")]
@@ -94,8 +94,7 @@ def test_the_row_does_not_depend_on_the_grid(tmp_path) -> None:
     text = 'name = "p"\n[[measure]]\nkind = "claim_model"\ncases = ["ershkov-partial-2"]\ndirections = ["forward"]\n'
     values = []
     for grid, times in (("1", '["1"]'), ("7", '["1/2", "5"]')):
-        (tmp_path / "p.toml").write_text(f"{text}times = {times}\ngrid = {grid}\n", "utf-8")
-        rows = [measure(task) for task in expand(load(str(tmp_path / "p.toml"))[0])]
+        rows = [measure(task) for task in tasks_of(tmp_path, f"{text}times = {times}\ngrid = {grid}\n")]
         values.append({row.integrator: row.metrics["claim_parts_by_1_percent_at"].value for row in rows})
     assert values == [{"claim:smooth": "0.201444", "claim:printed": "0.0100002"}] * 2
 

@@ -23,18 +23,16 @@ from heavytop.integrate.trajectory import Problem
 from heavytop.measure import truth
 from heavytop.measure.truth import reference
 from heavytop.precision import DOUBLE, cross
-from heavytop.records import Report
 from heavytop.report.compare.noise import Policy
 from heavytop.top.equations import GYROSTAT, holding
-from support.reports import compare, expand, load, measure, summary
+from support.reports import compare, expand, load, measure, summary, tasks_of
+from support.small_reports import report
 
 CLASSES = ("euler", "lagrange", "kovalevskaya", "generic", "gyrostat")
 
 
 def tasks(tmp_path: Path, cases: str, run: str):
-    file = tmp_path / "plan.toml"
-    file.write_text(f'name = "own"\n[[measure]]\nkind = "growth"\ncases = [{cases}]\nruns = [{{ {run} }}]\n', "utf-8")
-    return expand(load(str(file))[0])
+    return tasks_of(tmp_path, f'name = "own"\n[[measure]]\nkind = "growth"\ncases = [{cases}]\nruns = [{{ {run} }}]\n')
 
 
 def row(tmp_path: Path, case: str, run: str):
@@ -134,8 +132,7 @@ def test_other_roundings_of_the_same_starts_are_the_same_law_and_no_alarm(tmp_pa
     rows = [measure(replace(task, seed=seed)) for seed in (0, 5)]
     assert rows[0].metrics != rows[1].metrics
     assert rows[0].key == rows[1].key
-    reports = [Report("heavytop-report/2", {}, {}, [row]) for row in rows]
-    assert compare(*reports, Policy()).verdict == "same"
+    assert compare(*map(report, rows), Policy()).verdict == "same"
 
 
 @pytest.mark.slow
@@ -186,10 +183,7 @@ def test_what_takes_too_long_to_compute_has_drift_alone(tmp_path: Path, monkeypa
 def test_failed_starts_are_counted_and_never_averaged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def with_a_wild_one(case, count, seed):
         (top, first), *rest = ensemble_of(case, count, seed)
-        return [(top, replace_omega(first)), *rest]
-
-    def replace_omega(start):
-        return type(start)([Fraction(10) ** 140, Fraction(10) ** 140, 1], start.gamma)
+        return [(top, type(first)([Fraction(10) ** 140, Fraction(10) ** 140, 1], first.gamma)), *rest]
 
     plain = row(tmp_path, "lagrange", 'horizon = "20", starts = 10, decades = 2')
     monkeypatch.setattr(registry, "MOST_STEPS", 10**400)  # so that what overflows is tried
@@ -206,7 +200,7 @@ def test_failed_starts_are_counted_and_never_averaged(tmp_path: Path, monkeypatc
 def test_the_laws_are_said_in_words(tmp_path: Path) -> None:
     console = Console(width=160, record=True, file=StringIO())
     (task,) = tasks(tmp_path, '"kovalevskaya"', 'precision = "double", horizon = "5e2", starts = 9, decades = 3')
-    console.print(summary(Report("s", {"name": "own"}, {}, [measure(task.of(replace(task.case, name="mine")))])))
+    console.print(summary(report(measure(task.of(replace(task.case, name="mine"))))))
     text = console.export_text()
     assert "Growth laws" in text
     (line,) = [line for line in text.splitlines() if "energy" in line]
@@ -272,15 +266,12 @@ def test_a_row_goes_on_behind_the_starts_that_are_done(tmp_path: Path, monkeypat
 
     asked = []
 
-    def watched(problems, *args, **options):
-        if options.get("finished"):
+    def watched(_, problems, times, observer=None, finished=None, **options):
+        if finished:
             asked.append(len(problems))
-        return propagate_ensemble(problems, *args, **options)
+        return propagate_ensemble(problems, times, observer=observer, finished=finished, **options)
 
-    def watched_too(self, problems, times, observer=None, finished=None, **options):
-        return watched(problems, times, observer=observer, finished=finished, **options)
-
-    monkeypatch.setattr(Integrator, "propagate_many", watched_too)
+    monkeypatch.setattr(Integrator, "propagate_many", watched)
     path = tmp_path / "row-0.partial"
     deaths = 0
     while True:

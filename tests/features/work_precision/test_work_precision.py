@@ -17,9 +17,9 @@ from heavytop.integrate.peers.scipy_ivp import dop853
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.integrator import Repeats
 from heavytop.precision import DOUBLE, exact
-from heavytop.records import SCHEMA, Report
 from heavytop.report.compare.noise import Policy
-from support.reports import compare, expand, load, measure
+from support.reports import compare, measure, tasks_of
+from support.small_reports import report
 
 HEAD = 'name = "p"\n[[measure]]\nkind = "work_precision"\n'
 
@@ -29,15 +29,9 @@ def few_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(work_precision, "_USUAL", Repeats(2, 2, 0.0))
 
 
-def tasks(tmp_path: Path, text: str) -> list:
-    file = tmp_path / "p.toml"
-    file.write_text(HEAD + text, "utf-8")
-    return expand(load(str(file))[0])
-
-
 def rows(tmp_path: Path, case: str, horizon: str, *ladders: str, samples: int = 10) -> list:
     text = f'cases = ["{case}"]\nhorizon = "{horizon}"\nsamples = {samples}\nladders = [{", ".join(ladders)}]\n'
-    return [measure(task) for task in tasks(tmp_path, text)]
+    return [measure(task) for task in tasks_of(tmp_path, HEAD + text)]
 
 
 def error(row, name: str) -> float:
@@ -80,8 +74,7 @@ def test_finer_rungs_err_less_and_every_format_has_its_floor(tmp_path: Path) -> 
     assert len({row.key for row in found}) == len(found)
     for row in found:
         assert error(row, "return_error") < 1000 * error(row, "error_max")
-    report = Report(SCHEMA, {"name": "p"}, {}, found)
-    assert compare(report, report, Policy()).verdict == "same"
+    assert compare(report(*found), report(*found), Policy()).verdict == "same"
 
 
 @pytest.mark.slow
@@ -151,4 +144,4 @@ def test_a_rotor_has_no_way_back(tmp_path: Path) -> None:
 )
 def test_a_ladder_that_leads_nowhere_is_refused(ladder: str, message: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=message):
-        tasks(tmp_path, f'cases = ["euler"]\nhorizon = "10"\nladders = [{ladder}]\n')
+        tasks_of(tmp_path, HEAD + f'cases = ["euler"]\nhorizon = "10"\nladders = [{ladder}]\n')
