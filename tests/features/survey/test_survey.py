@@ -213,28 +213,20 @@ def test_an_integrator_without_lanes_is_surveyed_too() -> None:
 
 
 @pytest.mark.parametrize(
-    ("more", "said"),
+    ("old", "new", "said"),
     [
-        ('precision = "quad"', "precision must be that of a survey; got quad"),
-        ('tolerance = "nan"', "not a finite number"),
-        ("samples = 0", "samples"),
-        ('integrator = "none-such"', "none-such"),
+        ("samples = 3", 'precision = "quad"\nsamples = 3', "precision must be that of a survey; got quad"),
+        ("samples = 3", 'tolerance = "nan"\nsamples = 3', "not a finite number"),
+        ("samples = 3", "samples = 0", "samples"),
+        ("samples = 3", 'integrator = "none-such"\nsamples = 3', "none-such"),
+        ("samples = 3", 'map = ["omega1"]\nsamples = 3', "two axes"),
+        ('"sweep:many"', '"sweep:many", "euler"', "must name a sweep; got 'euler'"),
     ],
 )
-def test_impossible_surveys_are_refused(tmp_path: Path, more: str, said: str) -> None:
-    if more == "samples = 0":
-        file = plan(tmp_path)
-        file.write_text(file.read_text().replace("samples = 3", more))
-    else:
-        file = plan(tmp_path, more=more)
+def test_impossible_surveys_are_refused(tmp_path: Path, old: str, new: str, said: str) -> None:
+    file = plan(tmp_path)
+    file.write_text(file.read_text().replace(old, new))
     with pytest.raises(InputError, match=said):
-        read(str(file), KINDS)
-
-
-def test_a_survey_of_a_single_case_is_refused(tmp_path: Path) -> None:
-    file = tmp_path / "p.toml"
-    file.write_text('name = "x"\n[[measure]]\nkind = "survey"\ncases = ["euler"]\nhorizon = "1"\n')
-    with pytest.raises(InputError, match="sweep"):
         read(str(file), KINDS)
 
 
@@ -260,12 +252,7 @@ def test_the_page_draws_the_worst_motions_and_the_map_asked_for(tmp_path: Path) 
     assert sum(row.spread.histograms["error_max"].counts) == 45  # type: ignore[union-attr]
 
 
-def test_a_map_without_two_axes_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="two axes"):
-        read(str(plan(tmp_path, more='map = ["omega1"]')), KINDS)
-
-
-def _surveyed(folder: Path, monkeypatch: pytest.MonkeyPatch, fault: float = 0.0, places: tuple[int, ...] = ()) -> Path:
+def _surveyed(folder: Path, fault: float = 0.0, places: tuple[int, ...] = ()) -> Path:
     """A run of 80 motions, of which some are off by a planted error of γ1; NaN for runs that end early."""
     runs = records._runs
 
@@ -276,20 +263,21 @@ def _surveyed(folder: Path, monkeypatch: pytest.MonkeyPatch, fault: float = 0.0,
         return outcomes, states, steps
 
     folder.mkdir()
-    file = plan(folder, 80)
-    with monkeypatch.context() as patch:
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr(records, "_runs", faulty)
         patch.setattr("heavytop.api.run_folder.page.write_report", lambda *given: None)
-        ht.run(file, folder / "out", workers=1)
+        ht.run(plan(folder, 80), folder / "out", workers=1)
     return folder / "out"
 
 
+@pytest.fixture(scope="module")
+def healthy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return _surveyed(tmp_path_factory.mktemp("surveys") / "healthy")
+
+
 @pytest.mark.slow
-def test_motions_that_got_worse_are_listed_with_the_command_that_shows_each(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    healthy = _surveyed(tmp_path / "healthy", monkeypatch)
-    faulty = _surveyed(tmp_path / "faulty", monkeypatch, 1e-9, (11, 40))
+def test_motions_that_got_worse_are_listed_with_the_command_that_shows_each(healthy: Path, tmp_path: Path) -> None:
+    faulty = _surveyed(tmp_path / "faulty", 1e-9, (11, 40))
     (found,) = ht.compare(healthy, faulty).motions
     assert (found.joined, found.worse, {each.index for each in found.first}) == (80, 2, {11, 40})
     table = ht.read_survey(healthy)
@@ -305,10 +293,9 @@ def test_motions_that_got_worse_are_listed_with_the_command_that_shows_each(
     assert (back.worse, back.sentence) == (0, "")
 
 
-def test_a_command_made_of_a_record_measures_the_same_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    out = _surveyed(tmp_path / "healthy", monkeypatch)
-    (row,) = ht.read_report(out).rows
-    columns = comparing._records(out / "survey.parquet", row)
+def test_a_command_made_of_a_record_measures_the_same_motion(healthy: Path) -> None:
+    (row,) = ht.read_report(healthy).rows
+    columns = comparing._records(healthy / "survey.parquet", row)
     for index in (3, 70):
         line = comparing._command(row, columns, index, "success").partition(" | ")[0].split()
         state = json.loads(heavytop("propagate", *line[2:]).stdout)
@@ -318,21 +305,16 @@ def test_a_command_made_of_a_record_measures_the_same_motion(tmp_path: Path, mon
 
 
 @pytest.mark.slow
-def test_a_fault_that_no_quantile_sees_is_listed_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fault_that_no_quantile_sees_is_listed_all_the_same(tmp_path: Path) -> None:
     before = tuple(range(0, 80, 3))  # a third of the motions is off in both
-    healthy = _surveyed(tmp_path / "healthy", monkeypatch, 1e-9, before)
-    faulty = _surveyed(tmp_path / "faulty", monkeypatch, 1e-9, (*before, 11))
-    found = ht.compare(healthy, faulty)
+    found = ht.compare(*(_surveyed(tmp_path / str(len(off)), 1e-9, off) for off in (before, (*before, 11))))
     assert found.verdict == "same"
     assert [each.index for each in found.motions[0].first] == [11]
 
 
 @pytest.mark.slow
-def test_a_motion_that_fails_now_is_worse_than_any_that_lost_digits(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    healthy = _surveyed(tmp_path / "healthy", monkeypatch)
-    faulty = _surveyed(tmp_path / "faulty", monkeypatch, math.nan, (7,))
+def test_a_motion_that_fails_now_is_worse_than_any_that_lost_digits(healthy: Path, tmp_path: Path) -> None:
+    faulty = _surveyed(tmp_path / "faulty", math.nan, (7,))
     (found,) = ht.compare(healthy, faulty).motions
     assert [(each.index, each.after, each.outcome) for each in found.first] == [(7, None, "incomplete")]
     assert not found.first[0].command.endswith("score -")
@@ -340,8 +322,7 @@ def test_a_motion_that_fails_now_is_worse_than_any_that_lost_digits(
 
 
 @pytest.mark.slow
-def test_surveys_of_other_tops_are_not_joined(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    healthy = _surveyed(tmp_path / "healthy", monkeypatch)
+def test_surveys_of_other_tops_are_not_joined(healthy: Path, tmp_path: Path) -> None:
     file = plan(tmp_path, 9)
     file.write_text(file.read_text().replace("seed = 3", "seed = 4"))
     ht.run(file, tmp_path / "other", workers=1)
