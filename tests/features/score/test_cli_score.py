@@ -24,7 +24,7 @@ from heavytop.features.score.text import digits_over_time, guessed, requirement,
 from heavytop.features.score.trajectories.files import read as read_file
 from heavytop.features.score.trajectories.observed import GivenTrajectory, of_arrays
 from heavytop.harness.plan import read
-from heavytop.integrate.heyoka.motions import propagate
+from heavytop.measure.scalar import digits_kept
 from heavytop.measure.scorer import SOLUTION_ERROR
 from heavytop.precision import DOUBLE
 from heavytop.records import Quantity, Series
@@ -36,11 +36,17 @@ pytestmark = pytest.mark.pictures
 
 CASE = CASES["lagrange"]
 TIMES = [Fraction(k) for k in range(1, 9)]
+HEADER = "t,omega1,omega2,omega3,gamma1,gamma2,gamma3"
 
 
 def command(*arguments: str) -> tuple[int, str, str]:
     done = CliRunner().invoke(app, list(arguments), catch_exceptions=False)
     return done.exit_code, done.stdout, done.stderr
+
+
+def lines_of(times, states) -> list[str]:
+    """The rows of a file, in digits that name each double."""
+    return [",".join([str(t), *(repr(float(x)) for x in state)]) for t, state in zip(times, states, strict=True)]
 
 
 def given(case=CASE, times=TIMES, spoilt=lambda i, state: state, precision=DOUBLE) -> GivenTrajectory:
@@ -87,8 +93,7 @@ def test_the_first_lines_say_how_good_it_is() -> None:
 @pytest.mark.parametrize("name", ["double-double", "real:600"])
 def test_there_is_no_sentence_about_heyoka_where_it_did_not_run(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("heavytop.features.score.measurement._EFFORT", 1e-6)
-    values = given().states
-    rows = [list(state) for state in values]
+    rows = [list(state) for state in given().states]
     found = assess(of_arrays(CASE.top, CASE.start, CASE.system, TIMES, rows, ht.precision.parse(name), "a", "b"))
     assert found.peer is None
     assert not any("heyoka" in line for line in printed(found)[:3])
@@ -96,7 +101,9 @@ def test_there_is_no_sentence_about_heyoka_where_it_did_not_run(name: str, monke
 
 @pytest.mark.slow
 def test_without_a_reference_and_without_a_sample_no_digits_are_said(unknown: Assessment) -> None:
-    assert (unknown.digits_right, unknown.peer, unknown.direction) == (None, None, None)
+    assert (unknown.digits_right, digits_kept(unknown.row), unknown.peer, unknown.direction) == (None,) * 4
+    assert "no reference" in unknown.row.against
+    assert "drift_energy_max" in unknown.row.metrics
     assert printed(unknown)[0].startswith("How many digits are right is not known")
     lost = assess(given(spoilt=lambda i, state: [float("nan")] * 6))
     assert printed(lost)[:2] == [
@@ -108,20 +115,15 @@ def test_without_a_reference_and_without_a_sample_no_digits_are_said(unknown: As
 @pytest.mark.slow
 def test_the_command_takes_a_case_and_writes_json_and_a_page(tmp_path: Path) -> None:
     run = ht.propagate(CASE.top, CASE.start, TIMES, DOUBLE)
-    states = [[repr(float(v) * (-1 if i > 2 else 1)) for i, v in enumerate(state)] for state in run.states]
-    rows = [",".join([str(time), *state]) for time, state in zip(TIMES, states, strict=True)]
+    rows = lines_of(TIMES, run.to_numpy() * [1, 1, 1, -1, -1, -1])
     file, page = tmp_path / "mine.csv", tmp_path / "page.html"
     file.write_text("\n".join(["t,Ω1,Ω2,Ω3,γ1,γ2,γ3", *rows]), "utf-8")
     code, out, _ = command("score", str(file), "--case", "lagrange", "--json", "--html", str(page))
     assert code == 0
     said = json.loads(out)
     assert said["digits_right"] == said["digits_kept"] < 1
-    assert (said["of_digits"], said["format_guessed"], said["precision"], said["case"]) == (
-        16,
-        True,
-        "double",
-        "lagrange",
-    )
+    assert [said[key] for key in ("of_digits", "format_guessed", "case")] == [16, True, "lagrange"]
+    assert said["precision"] == "double"
     assert said["peer"]["digits_right"] > 14
     (diagnosis,) = said["diagnosis"]
     assert diagnosis["kind"] == "gamma_down"
@@ -146,18 +148,14 @@ def test_the_page_draws_both_parts_and_is_the_same_every_time(unknown: Assessmen
 def write_motion(folder: Path, spoilt=lambda i, state: state, more: str = "") -> str:
     """A file of the motion of the case."""
     motion = given(spoilt=spoilt)
-    lines = [",".join([str(t), *(repr(float(x)) for x in s)]) for t, s in zip(motion.times, motion.states, strict=True)]
-    head = "t,omega1,omega2,omega3,gamma1,gamma2,gamma3"
-    (folder / "motion.csv").write_text("\n".join([head, *lines, *([more] if more else [])]) + "\n", "utf-8")
+    lines = [HEADER, *lines_of(motion.times, motion.states), *([more] if more else [])]
+    (folder / "motion.csv").write_text("\n".join(lines) + "\n", "utf-8")
     return str(folder / "motion.csv")
 
 
 @pytest.mark.slow
 def test_the_page_of_score_and_that_of_its_report_are_the_same(tmp_path: Path) -> None:
-    def spoilt(i: int, state: list) -> list:
-        return [*state[:3], *(-x for x in state[3:])]
-
-    motion, out = write_motion(tmp_path, spoilt), str(tmp_path / "out")
+    motion, out = write_motion(tmp_path, lambda i, state: [*state[:3], *(-x for x in state[3:])]), str(tmp_path / "out")
     pages = [tmp_path / name for name in ("a.html", "b.html", "c.html")]
     command("score", motion, "--case", "lagrange", "--html", str(pages[0]), "--out", out)
     command("score", motion, "--case", "lagrange", "--html", str(pages[1]))
@@ -249,17 +247,15 @@ def test_the_data_of_a_case_can_be_pasted_everywhere(name: str, tmp_path: Path) 
     exec(data["python"], names)
     assert (names["top"], names["start"]) == (case.top, case.start)
     # CSV
-    from heavytop.features.score.trajectories.files import read as read_trajectory
-
     rows = [",".join([time, *state]) for time, state in zip(made["times"], made["states"], strict=True)]
     (tmp_path / "a.csv").write_text("\n".join([data["csv"], *rows]))
-    assert read_trajectory(tmp_path / "a.csv").start == case.start
+    assert read_file(tmp_path / "a.csv").start == case.start
     # JSON
     _, text, _ = command("list", "--case", name)
     pasted = json.loads(re.search(r"^\{.*?^\}", text, re.S | re.M)[0])
     pasted |= {key: made[key] for key in ("times", "states")}
     (tmp_path / "a.json").write_text(json.dumps(pasted))
-    assert read_trajectory(tmp_path / "a.json").start == case.start
+    assert read_file(tmp_path / "a.json").start == case.start
     assert tomllib.loads(data["toml"])
 
 
@@ -278,21 +274,16 @@ def test_list_names_everything_once() -> None:
 
 @pytest.mark.slow
 def test_numbers_of_single_precision_are_noticed(tmp_path: Path) -> None:
-    import numpy
-
-    case = CASES["lagrange"]
-    run = propagate(case.top, case.start, range(1, 6), DOUBLE)
-    off = (run.to_numpy() * (1 + 1e-5)).astype(numpy.float32).astype(float)
-    lines = ["t,omega1,omega2,omega3,gamma1,gamma2,gamma3"]
-    lines += [",".join(map(repr, [k + 1.0, *map(float, state)])) for k, state in enumerate(off)]
+    off = (ht.propagate(CASE.top, CASE.start, TIMES).to_numpy() * (1 + 1e-5)).astype("float32").astype(float)
+    lines = [HEADER, *lines_of(map(float, TIMES), off)]
     (tmp_path / "m.csv").write_text("\n".join(lines))
-    found = assess(read_file(tmp_path / "m.csv", case))
+    found = assess(read_file(tmp_path / "m.csv", CASE))
     assert found.diagnoses == []
     assert "single precision (24 bits)" in (guessed(found) or "")
     decimal = "\n".join([lines[0], *(line.replace(".", ",") for line in lines[1:])])
     (tmp_path / "comma.csv").write_text(decimal)
     with pytest.raises(InputError) as caught:
-        read_file(tmp_path / "comma.csv", case)
+        read_file(tmp_path / "comma.csv", CASE)
     assert caught.value.remedy == "Are these decimal commas? Separate the columns by semicolons."
 
 

@@ -285,7 +285,6 @@ def test_a_row_that_is_missing_or_stands_twice_is_found(row: int) -> None:
     top, start, times = problem(8)
     times = [Fraction(k, 2) for k in range(1, 12)]
     y = motion(top, start, HEAVY_TOP, times)
-    assert y is not None
     (missing,) = found(top, start, times[:-1], np.delete(y, row, axis=0))
     assert (missing.kind, float(missing.numbers["t"])) == ("row_missing", float(times[row]))
     (twice,) = found(top, start, times, np.insert(y, row, y[row], axis=0)[:-1])
@@ -311,7 +310,6 @@ def test_a_sentence_says_of_which_states_it_is_true_where_not_all_were_looked_at
     top, start, _ = problem(8)
     times = [Fraction(k) for k in range(1, 101)]
     y = motion(top, start, HEAVY_TOP, times)
-    assert y is not None
     y[:60, 3:] *= -1
     (told,) = found(top, start, times, y)
     assert told.kind == "gamma_down"
@@ -328,7 +326,6 @@ def test_a_sentence_says_of_which_states_it_is_true_where_not_all_were_looked_at
 def test_rounded_states_are_told_where_rounding_is_the_error(digits: int, kind: str) -> None:
     top, start, times = problem(9)
     y = motion(top, start, HEAVY_TOP, times)
-    assert y is not None
     match kind:
         case "decimals":
             spoilt = np.round(y, digits)
@@ -351,51 +348,36 @@ def test_rounded_states_are_told_where_rounding_is_the_error(digits: int, kind: 
     assert roundings(rows, DOUBLE) == []
 
 
+IN_UNITS = {
+    "": (lambda y, moments: y, {}),
+    "axes_permuted": (lambda y, moments: y[:, [1, 2, 0, 4, 5, 3]], {"of": "both", "axes": "2,3,1"}),
+    "columns_swapped": (lambda y, moments: y[:, [3, 4, 5, 0, 1, 2]], {}),
+    "column_order": (lambda y, moments: y[:, [0, 3, 1, 4, 2, 5]], {"columns": "Ω1, γ1, Ω2, γ2, Ω3, γ3"}),
+    "start_momentum": (lambda y, moments: y, {}),
+    "all_momentum": (lambda y, moments: y * [*moments, 1, 1, 1], {}),
+}
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("power", [-60, 100])
-def test_columns_in_each_other_s_place_are_found_in_any_unit_of_time(power: int) -> None:
+@pytest.mark.parametrize(
+    ("time", "inertia", "kinds"),
+    [
+        *((time, 0, ("columns_swapped",)) for time in (-60, 100)),
+        *((power, power, ("", "axes_permuted")) for power in (-60, 60)),
+        *((*powers, ("column_order", "start_momentum", "all_momentum")) for powers in ((-30, 30), (30, -30), (0, 30))),
+    ],
+)
+def test_units_of_any_size_do_not_matter(time: int, inertia: int, kinds: tuple[str, ...]) -> None:
     top, start, times = problem(10)
-    y = motion(top, start, HEAVY_TOP, times)
-    assert y is not None
-    size = Fraction(10) ** power
-    slow = HeavyTop(top.inertia, top.weight / size**2, top.centre)
-    begin = State([w / size for w in start.omega], start.gamma)
-    swapped = np.hstack([y[:, 3:6], y[:, :3] / float(size)])
-    (told,) = found(slow, begin, [time * size for time in times], swapped)
-    assert (told.kind, told.numbers) == ("columns_swapped", {})
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("power", [-60, 60])
-def test_units_of_any_size_do_not_matter(power: int) -> None:
-    top, start, times = problem(10)
-    size = Fraction(10) ** power
-    slow = State([w / size for w in start.omega], start.gamma)
-    heavy = HeavyTop([i * size for i in top.inertia], top.weight / size, top.centre)
-    late = [t * size for t in times]
-    y = runge_kutta(top, start, times) * ([float(1 / size)] * 3 + [1] * 3)
-    assert found(heavy, slow, late, y) == []
-    (told,) = found(heavy, slow, late, y[:, [1, 2, 0, 4, 5, 3]])
-    assert (told.kind, told.numbers["axes"]) == ("axes_permuted", "2,3,1")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("time", "inertia"), [(-30, 30), (30, -30), (0, 30)])
-def test_an_order_of_columns_and_the_momentum_of_a_start_are_named_in_any_units(time: int, inertia: int) -> None:
-    top, start, times = problem(11)
     unit, size = Fraction(10) ** time, Fraction(10) ** inertia
-    slow = State([w / unit for w in start.omega], start.gamma)
     heavy = HeavyTop([i * size for i in top.inertia], top.weight * size / unit**2, top.centre)
-    late = [t * unit for t in times]
     y = runge_kutta(top, start, times) * ([float(1 / unit)] * 3 + [1] * 3)
-    (told,) = found(heavy, slow, late, y[:, [0, 3, 1, 4, 2, 5]])
-    assert (told.kind, told.numbers["columns"]) == ("column_order", "Ω1, γ1, Ω2, γ2, Ω3, γ3")
-    momentum = State([w * i for w, i in zip(slow.omega, heavy.inertia, strict=True)], slow.gamma)
-    (told,) = found(heavy, momentum, late, y)
-    assert (told.kind, told.numbers) == ("start_momentum", {})
-    momenta = np.hstack([y[:, :3] * [float(i) for i in heavy.inertia], y[:, 3:]])
-    (told,) = found(heavy, momentum, late, momenta)
-    assert (told.kind, told.numbers) == ("all_momentum", {})
+    for kind in kinds:
+        weights = heavy.inertia if kind.endswith("momentum") else (1, 1, 1)
+        begin = State([w * i / unit for w, i in zip(start.omega, weights, strict=True)], start.gamma)
+        change, numbers = IN_UNITS[kind]
+        told = found(heavy, begin, [t * unit for t in times], change(y, [float(i) for i in heavy.inertia]))
+        assert [(each.kind, each.numbers) for each in told] == ([(kind, numbers)] if kind else [])
 
 
 @pytest.mark.slow

@@ -132,15 +132,6 @@ def test_what_is_not_finite_is_a_verdict(word: str, tmp_path: Path) -> None:
     assert digits_kept(none) is None
 
 
-@pytest.mark.slow
-def test_without_a_reference_the_drift_is_scored(tmp_path: Path) -> None:
-    given = document(case=CASES["generic"], times=[Fraction(3000)])  # no digit of a double is left
-    row = measured(read(written(tmp_path, given))).row
-    assert "no reference" in row.against
-    assert "drift_energy_max" in row.metrics
-    assert digits_kept(row) is None
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
