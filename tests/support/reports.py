@@ -80,12 +80,6 @@ html = SimpleNamespace(
 )
 
 
-def tasks_of(folder: Path, text: str) -> Any:
-    """The measurements of a plan in this folder, of which this is the text."""
-    (folder / "plan.toml").write_text(text, "utf-8")
-    return expand(load(str(folder / "plan.toml"))[0])
-
-
 def rows(tasks: Any, workers: int, scheduler: str | None = None, *more: Any, **others: Any) -> Any:
     return _workers.rows(tasks, KINDS, workers, scheduler, *more, **others)
 

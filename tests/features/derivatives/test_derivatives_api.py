@@ -11,12 +11,12 @@ import pytest
 
 import heavytop as ht
 from heavytop.errors import InputError, OutOfReach
-from support.helpers import START, TOP
+from support.helpers import DATA, START, TOP
 from support.in_process import heavytop
 
 TIMES = [1, "3/2"]
-DATA = ["--inertia", "3,2,1", "--weight", "1", "--centre", "1/2,1/3,1/5", "--omega", "1/10,2/5,9/10"]
-COMMAND = ["reference", *DATA, "--gamma", "3/5,0,4/5", "--times", "0,1", "--digits", "20"]
+OPTIONS = [part for name, value in DATA.items() for part in (f"--{name}", value)]
+COMMAND = ["reference", *OPTIONS, "--times", "0,1", "--digits", "20"]
 
 
 @pytest.fixture(scope="module")

@@ -7,10 +7,9 @@ import json
 import pytest
 
 import heavytop as ht
-from support.helpers import START, TOP
+from support.helpers import DATA, START, TOP
 from support.in_process import heavytop
 
-DATA = {"inertia": "3,2,1", "weight": "1", "centre": "1/2,1/3,1/5", "omega": "1/10,2/5,9/10", "gamma": "3/5,0,4/5"}
 OPTIONS = [part for name, value in (DATA | {"times": "1,10"}).items() for part in (f"--{name}", value)]
 
 

@@ -21,7 +21,7 @@ from heavytop.report.compare.noise import Policy
 from support.reports import compare, measure, tasks_of
 from support.small_reports import report
 
-HEAD = 'name = "p"\n[[measure]]\nkind = "work_precision"\n'
+HEAD = '[[measure]]\nkind = "work_precision"\n'
 
 
 @pytest.fixture(autouse=True)
