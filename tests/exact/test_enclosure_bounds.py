@@ -163,34 +163,21 @@ def test_a_set_of_errors_is_as_large_as_its_components_say():
 
 
 def exact_variation(found, top):
-    """V by powers of τ up to ``top``, of the step's polynomial as it is: V_{n+1} = Σ_j J_j V_{n−j}/(n + 1), exact."""
-    unit = [tuple(Fraction(int(i == j)) for i in SIX) for j in SIX]
+    """V by powers of τ up to ``top``, of the step's polynomial as it is: V' = h J V, exact.
 
-    def rates(y):
-        return HEAVY_TOP.field(PARAMETERS, y)
-
-    zero = rates((Fraction(0),) * 6)
-    linear = [[(a - b) / 2 for a, b in zip(rates(e), rates(tuple(-x for x in e)), strict=True)] for e in unit]
-
-    def jacobian(column, constant):
-        columns = []
-        for e, line in zip(unit, linear, strict=True):
-            both, alone = rates(tuple(x + y for x, y in zip(column, e, strict=True))), rates(e)
-            columns.append(
-                [b - a - c + z + (x if constant else 0)
-                 for b, a, c, z, x in zip(both, alone, rates(column), zero, line, strict=True)]
-            )  # fmt: skip
-        return fmpq_mat(6, 6, [rational(found.length * columns[j][i]) for i in SIX for j in SIX])
-
-    columns = [tuple(int(v) * ulp(found) for v in column) for column in zip(*found.coefficients, strict=True)]
-    parts = [jacobian(column, n == 0) for n, column in enumerate(columns[: top + 1])]
-    rows = [fmpq_mat(6, 6, [int(i == j) for i in SIX for j in SIX])]
-    for n in range(top):
-        total = fmpq_mat(6, 6)
-        for j in range(min(n, len(parts) - 1) + 1):
-            total += parts[j] * rows[n - j]
-        rows.append(total * fmpq(1, n + 1))
-    return [[[Fraction(int(m[i, j].p), int(m[i, j].q)) for j in SIX] for i in SIX] for m in rows]
+    J v = (f(y + v) − f(y − v))/2, as f is quadratic.
+    """
+    p, half = PARAMETERS.mapped(rational), rational(found.length) / 2
+    y = [fmpq_poly([fmpq(int(c), 2**found.precision) for c in component]) for component in found.coefficients]
+    columns = []
+    for j in SIX:
+        v = [fmpq_poly([int(i == j)]) for i in SIX]
+        for n in range(top):
+            up, down = (HEAVY_TOP.field(p, [a + s * b for a, b in zip(y, v, strict=True)]) for s in (1, -1))
+            v = [x + fmpq_poly([0] * (n + 1) + [half * (a - b)[n] / (n + 1)])
+                 for x, a, b in zip(v, up, down, strict=True)]  # fmt: skip
+        columns.append(v)
+    return [[[Fraction(int(v[i][n].p), int(v[i][n].q)) for v in columns] for i in SIX] for n in range(top + 1)]
 
 
 @pytest.mark.slow

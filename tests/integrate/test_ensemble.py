@@ -16,6 +16,7 @@ from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.integrate.heyoka import lanes
 from heavytop.integrate.heyoka.lanes import Lanes
 from heavytop.integrate.heyoka.motions import propagate
+from heavytop.integrate.multiword.lanes import propagate_multiword_ensemble
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, real
 from heavytop.top.attitude import perpendicular
@@ -318,10 +319,15 @@ def test_the_start_alone_needs_no_step() -> None:
         (problems(1) + problems(1, xi=perpendicular(start(0).gamma)), [1], {}),
         ([of_case("generic"), of_case("gyrostat")], [1], {}),
         (problems(2), [1], {"threads": 0}),
-        (problems(2), [1], {"lanes": 1}),
     ],
-    ids=["none", "no times", "both signs", "not monotone", "formats", "attitudes", "systems", "no threads", "one lane"],
+    ids=["none", "no times", "both signs", "not monotone", "formats", "attitudes", "systems", "no threads"],
 )
-def test_bad_input_is_refused(given, times, options) -> None:
+def test_bad_input_is_refused_by_every_ensemble(given, times, options) -> None:
+    for ensemble in (propagate_ensemble, propagate_multiword_ensemble):
+        with pytest.raises(InputError):
+            ensemble(given, times, **options)
+
+
+def test_one_lane_is_no_ensemble() -> None:
     with pytest.raises(InputError):
-        propagate_ensemble(given, times, **options)
+        propagate_ensemble(problems(2), [1], lanes=1)

@@ -9,12 +9,10 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 
-import numpy as np
 import pytest
 
 from heavytop.cases import CASES
 from heavytop.display import LazyLines, TitledTable
-from heavytop.errors import InputError
 from heavytop.integrate.heyoka import motions
 from heavytop.integrate.heyoka.motions import first_steps, propagate
 from heavytop.integrate.multiword import motions as multiword_motions
@@ -24,7 +22,7 @@ from heavytop.multiword.double_double import double_double_run
 from heavytop.multiword.fixed_point import fixed_point_run, steps
 from heavytop.multiword.fixed_point.fixed_point_run import Fixed
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, parse
-from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
+from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State
 from support.helpers import distance
 
 CASE = CASES["kovalevskaya"]
@@ -189,34 +187,6 @@ def test_the_first_and_last_rows_alone_are_formatted() -> None:
         calls.append(pstats.Stats(profile).total_calls)
     assert calls[1] - calls[0] < 3000  # beside what is said of the whole motion
     assert repr(run).count("\n") == 12
-
-
-@pytest.mark.parametrize(
-    ("times", "message"),
-    [
-        ([1, 1 + Fraction(1, 10**30), 1], "does not come after"),
-        ([1 + Fraction(1, 10**30), 1], "does not come after"),
-        ([1, -2], "different signs"),
-        ([-Fraction(1, 10**400), 1], "different signs"),
-        ([0, 0], "more than once"),
-        ([1, 10**151], "too large"),
-        ([1, 10**400], "too large"),
-        ([], "No times"),
-    ],
-)
-def test_times_that_their_doubles_do_not_tell_apart_are_compared_exactly(times, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        check_times(times)
-
-
-def test_times_are_exact_and_checked_once() -> None:
-    times = [0, "1/3", 0.5, Fraction(2, 3), np.float64(0.75), 1]
-    found = check_times(times)
-    assert found == [Fraction(0), Fraction(1, 3), Fraction(1, 2), Fraction(2, 3), Fraction(3, 4), Fraction(1)]
-    assert check_times(found) is found
-    close = check_times([1, 1 + Fraction(1, 10**30), 1 + Fraction(2, 10**30)])
-    assert close[2] - close[1] == Fraction(1, 10**30)
-    assert close.doubles == []
 
 
 @pytest.mark.slow

@@ -7,7 +7,6 @@ from random import Random
 
 import pytest
 
-from heavytop.errors import InputError
 from heavytop.integrate.multiword import lanes
 from heavytop.integrate.multiword.lanes import propagate_multiword_ensemble
 from heavytop.integrate.multiword.motions import propagate_multiword
@@ -148,12 +147,3 @@ def test_the_gyrostat_goes_in_lanes_too() -> None:
     alone = propagate_multiword(top, start, TIMES, DOUBLE_DOUBLE, system=GYROSTAT)
     for run in propagate_multiword_ensemble(given, TIMES):
         assert distance(run, alone) < Fraction(1, 10**29)
-
-
-def test_what_is_no_ensemble_is_refused() -> None:
-    with pytest.raises(InputError):
-        propagate_multiword_ensemble([], TIMES)
-    with pytest.raises(InputError):
-        propagate_multiword_ensemble(problems(), TIMES, threads=0)
-    with pytest.raises(InputError):
-        propagate_multiword_ensemble([*problems(), Problem.of(TOP, State((1, 0, 0), (0, 0, 1)), QUAD)], TIMES)

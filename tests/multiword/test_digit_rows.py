@@ -27,7 +27,6 @@ from heavytop.multiword.fixed_point.steps import rows_of, size_of
 from heavytop.multiword.integers.integer_series import IntegerMotion
 from heavytop.multiword.problem import Scaled, Status
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
-from support.words_helpers import LEVELS, problem
 
 LARGEST = 2**23 + 4
 
@@ -42,10 +41,10 @@ def sums_code(wide: bool) -> Machine:
     return compiled(module)
 
 
-def known_sums(rows: numpy.ndarray, starts: tuple[list[int], list[int]], levels: int) -> list[int]:
+def known_sums(rows: numpy.ndarray, row: int, orders: int, levels: int) -> list[int]:
     """Σ d_i d'_j of each lane over i + j < levels, in units of the last level, whole."""
     total = [0] * LANES
-    pairs = list(zip(*starts, strict=True))
+    pairs = [(row * n, row * (orders - 1 - n)) for n in range(orders)]
     for lane in range(LANES):
         for i in range(levels):
             for j in range(levels - i):
@@ -53,6 +52,18 @@ def known_sums(rows: numpy.ndarray, starts: tuple[list[int], list[int]], levels:
                     products.BITS * (levels - 1 - i - j)
                 )
     return total
+
+
+def sums_of(machine: Machine, table: numpy.ndarray, row: int, orders: int, levels: int) -> numpy.ndarray:
+    """The sums of a table of digits with itself reversed, each level a row."""
+    sums, where = doubles(LANES * (levels + 1)), (LANES * row * numpy.arange(orders)).astype(numpy.int64)
+    arrays = table.ravel(), table[row * (orders - 1) :].ravel(), where
+    machine.functions["sums"](*map(pointer, arrays), orders, levels, pointer(sums))
+    return sums.reshape(-1, LANES)
+
+
+def whole(sums: numpy.ndarray, levels: int) -> list[int]:
+    return [sum(int(s) << products.BITS * (levels - k) for k, s in enumerate(lane)) for lane in sums.T]
 
 
 @pytest.mark.slow
@@ -69,18 +80,9 @@ def test_sums_of_products_are_exact(wide: bool, kind: str) -> None:
             table[:] = [[random.randint(-LARGEST, LARGEST) for _ in range(LANES)] for _ in range(row * orders)]
         else:
             table[:] = LARGEST if kind == "largest" else -LARGEST * (-1) ** numpy.arange(row * orders)[:, None]
-        sums = doubles(LANES * (levels + 1))
-        where = LANES * row * numpy.arange(orders)
-        last = row * (orders - 1)
-        arrays = [table.ravel(), table[last:].ravel(), where.astype(numpy.int64)]
-        machine.functions["sums"](*map(pointer, arrays), orders, levels, pointer(sums))
-        starts = [row * n for n in range(orders)]
-        found = sums.reshape(-1, LANES)
+        found = sums_of(machine, table, row, orders, levels)
         assert numpy.abs(found).max() < 2.0**products.SUM_BITS
-        known = known_sums(table, (starts, starts[::-1]), levels)
-        for lane in range(LANES):
-            whole = sum(int(s) << products.BITS * (levels - k) for k, s in enumerate(found[:, lane]))
-            assert whole == known[lane]
+        assert whole(found, levels) == known_sums(table, row, orders, levels)
 
 
 @pytest.mark.parametrize("words", [8, 13, 24])
@@ -107,12 +109,11 @@ def test_with_more_products_in_a_sum_some_would_be_wrong(times: int, monkeypatch
     machine, levels, orders = sums_code(True), 8, 60
     table = doubles(LANES * levels * orders).reshape(-1, LANES)
     table[:] = LARGEST - numpy.random.default_rng(1).integers(0, 9, len(table))[:, None]
-    sums, where = doubles(LANES * (levels + 1)), LANES * levels * numpy.arange(orders)
-    arrays = [table.ravel(), table[levels * (orders - 1) :].ravel(), where.astype(numpy.int64)]
-    machine.functions["sums"](*map(pointer, arrays), orders, levels, pointer(sums))
-    starts = [levels * n for n in range(orders)]
-    whole = sum(int(s) << products.BITS * (levels - k) for k, s in enumerate(sums[::LANES]))
-    assert (whole == known_sums(table, (starts, starts[::-1]), levels)[0]) == (times == 1)
+    found, known = (
+        whole(sums_of(machine, table, levels, orders, levels), levels),
+        known_sums(table, levels, orders, levels),
+    )
+    assert (found[0] == known[0]) == (times == 1)
 
 
 def conversion(grid: Grid) -> Machine:
@@ -219,17 +220,6 @@ def test_digits_that_count_as_zero_are(name: str) -> None:
             for side in digits[products._BEFORE :].reshape(1 + run.vectors, count, LANES):
                 assert not side[: run.starts[n]].any()
         assert run.starts[: run.order + 1].max() > 0
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("processor", LEVELS)
-def test_the_bits_are_those_of_every_processor(processor) -> None:
-    given = problem()
-    runs = [Fixed(given, grid_of(8), True, processor=each) for each in (None, processor)]
-    for run in runs:
-        assert run.advance(Fraction(2), 10**6) is Status.OK
-    own, other = ((run.state, run.steps, run.resume_words(), run.sample(Fraction(2))) for run in runs)
-    assert own == other
 
 
 def test_words_that_are_too_wide_for_the_bounds_are_watched() -> None:

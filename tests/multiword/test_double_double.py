@@ -2,7 +2,6 @@
 
 import math
 from fractions import Fraction
-from functools import cache
 from random import Random
 
 import numpy
@@ -12,7 +11,6 @@ from llvmlite import ir
 from heavytop.multiword.codegen.machine_code import (
     DOUBLE,
     POINTER,
-    Processor,
     compiled,
     doubles,
     function,
@@ -24,26 +22,10 @@ from heavytop.multiword.double_double.double_double_run import Floating, OrderSc
 from heavytop.multiword.double_double.eight_lane_run import Eight
 from heavytop.multiword.problem import Scaled, Status
 from heavytop.top.equations import HEAVY_TOP, Parameters
-from support.words_helpers import LEVELS, problem
+from support.words_helpers import problem
 
 FINEST, COARSE = Fraction(1, 2**105), Fraction(1, 10**16)
 LADDER = OrderSchedule.of(FINEST)
-
-
-@cache
-def bits_on(processor: Processor | None, attitude: bool, tolerance: Fraction) -> tuple[object, ...]:
-    """All that a run knows at t = 30, in code for that processor."""
-    run = Floating(problem(1, attitude), OrderSchedule.of(tolerance), True, processor=processor)
-    assert run.advance(Fraction(30), 10**6) is Status.OK
-    return run.state, run.time, run.steps, run.resume_words(), run.sample(Fraction(30))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("processor", LEVELS[1:])
-def test_the_bits_are_those_of_every_processor(processor: Processor) -> None:
-    """Without FMA code takes ten seconds to compile: that of eight lanes, of the same operations, stands for it."""
-    for tolerance in (FINEST, COARSE):
-        assert bits_on(processor, False, tolerance) == bits_on(None, False, tolerance)
 
 
 @pytest.mark.slow
@@ -103,12 +85,6 @@ def test_a_constant_times_a_number_has_the_nearest_high_word() -> None:
                 whole = c * (Fraction(a) + Fraction(low))
                 assert high == float(c * Fraction(a))
                 assert abs(Fraction(high) + Fraction(rest) - whole) <= abs(whole) / 2**105
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("processor", LEVELS[1:2])
-def test_the_bits_of_an_attitude_are_those_of_every_processor(processor: Processor) -> None:
-    assert bits_on(processor, True, COARSE) == bits_on(None, True, COARSE)
 
 
 def test_more_orders_are_kept_in_double_double_where_the_spin_is_fast() -> None:

@@ -14,7 +14,6 @@ from heavytop.multiword.double_double.eight_lane_run import Eight, exact_state
 from heavytop.multiword.problem import Scaled, Status
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
 from support.helpers import rotor
-from support.words_helpers import LEVELS
 
 FINE = OrderSchedule.of(Fraction(1, 2**105), FALL_IN_LANES)
 SPAN = Fraction(20)
@@ -94,13 +93,6 @@ def test_a_lane_that_needs_a_larger_n0_says_so_and_stops() -> None:
     eight = in_lanes(HEAVY_TOP, list(given), low_order=4)
     assert [eight.status(lane) for lane in range(8)] == [None] * 8
     assert [eight.taken(lane, None) for lane in range(8)] == [0] * 8
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("processor", LEVELS)
-def test_the_bits_are_those_of_every_processor(processor) -> None:
-    own, other = (coarse_samples(each) for each in (None, processor))
-    assert own == other
 
 
 def coarse_samples(processor: Processor | None) -> dict[int, tuple[Fraction, ...]]:

@@ -16,7 +16,6 @@ from heavytop.multiword.fixed_point.arithmetic import Grid, grid_of
 from heavytop.multiword.fixed_point.certified_series import CertifiedSeries
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
 from support.helpers import moments_of_a_body, rotor
-from support.words_helpers import LEVELS
 
 
 def some_motion(random: Random, system=HEAVY_TOP, attitude: bool = False, decades: int = 0) -> ScaledMotion:
@@ -253,19 +252,6 @@ def test_words_that_are_too_wide_are_refused_or_within_the_bound() -> None:
                 refused += share is None
                 assert share is None or share <= 1
     assert refused
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("processor", LEVELS)
-def test_the_bits_are_those_of_every_processor(processor) -> None:
-    motion = some_motion(Random(5), attitude=True)
-    grid = grid_of(4, whole=True)
-    one, other = (CertifiedSeries(motion.scaled, grid, True, processor=each) for each in (None, processor))
-    found, same = (certified.series(rounded(motion, grid), 3) for certified in (one, other))
-    assert found is not None
-    assert same is not None
-    assert found.values == same.values
-    assert found.rounding == same.rounding
 
 
 def test_a_carrier_travels_between_processes() -> None:

@@ -45,27 +45,6 @@ def test_the_field_is_the_vector_equation_of_the_paper(system) -> None:
             assert turning == (omega[0], omega[1] + p.rotor, omega[2])
 
 
-def printed_1_1(p: Parameters, y):
-    """(1.1) and (1.2) letter by letter, component by component."""
-    (i1, i2, i3), (pa, pb, pc) = p.inertia, p.moment
-    w1, w2, w3, g1, g2, g3 = y
-    return (
-        (g2 * pc - g3 * pb - (i3 - i2) * w2 * w3) / i1,
-        (g3 * pa - g1 * pc - (i1 - i3) * w3 * w1) / i2,
-        (g1 * pb - g2 * pa - (i2 - i1) * w1 * w2) / i3,
-        w3 * g2 - w2 * g3,
-        w1 * g3 - w3 * g1,
-        w2 * g1 - w1 * g2,
-    )
-
-
-def test_the_heavy_top_is_1_1_and_1_2_as_printed() -> None:
-    random = Random(2)
-    for _ in range(30):
-        p, y = random_problem(random)
-        assert HEAVY_TOP.field(p, y) == printed_1_1(p, y)
-
-
 @pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda s: s.name)
 def test_fractions_balls_mpf_sympy_and_heyoka_give_the_same_field(system) -> None:
     import heyoka

@@ -10,6 +10,7 @@ import heavytop as ht
 from heavytop.errors import InputError
 from heavytop.top.heavy_top import DoubleTimes, TimeText, check_times
 
+TINY = Fraction(1, 10**30)
 TOP = ht.HeavyTop((2, 2, 1), 1, (0, 0, "1/2"))
 START = ht.State(("1/5", "-1/3", "7/4"), ("2/7", "3/7", "6/7"))
 
@@ -71,6 +72,15 @@ def test_doubles_in_order_are_checked_as_an_array_and_give_the_same_bits(make: o
         assert tuple(one.times) == tuple(other.times)
 
 
+def test_times_are_exact_and_checked_once() -> None:
+    found = check_times([0, "1/3", 0.5, Fraction(2, 3), np.float64(0.75), 1])
+    assert found == [Fraction(0), Fraction(1, 3), Fraction(1, 2), Fraction(2, 3), Fraction(3, 4), Fraction(1)]
+    assert check_times(found) is found
+    close = check_times([1, 1 + TINY, 1 + 2 * TINY])
+    assert close[2] - close[1] == TINY
+    assert close.doubles == []
+
+
 def test_doubles_are_a_copy_and_backwards_they_go_as_well() -> None:
     given = np.array([-0.5, -1.0])
     found = check_times(given)
@@ -81,17 +91,22 @@ def test_doubles_are_a_copy_and_backwards_they_go_as_well() -> None:
 @pytest.mark.parametrize(
     ("times", "message"),
     [
+        ([], "No times"),
         ([1.0, 0.5], "does not come after"),
+        ([1, 1 + TINY, 1], "does not come after"),  # what doubles do not tell apart
+        ([1 + TINY, 1], "does not come after"),
         ([-1.0, 1.0], "different signs"),
+        ([-Fraction(1, 10**400), 1], "different signs"),
         ([0.0, 0.0], "more than once"),
         ([1.0, float("nan")], "not a finite number"),
         ([1.0, float("inf")], "not a finite number"),
         ([1.0, 1e200], "too large"),
+        ([1, 10**400], "too large"),
         ([float("nan")], "not a finite number"),
     ],
 )
-def test_doubles_that_are_no_times_are_refused_as_others_are(times: list[float], message: str) -> None:
-    for given in (times, np.array(times)):
+def test_what_are_no_times_is_refused(times: list, message: str) -> None:
+    for given in (times, np.array(times)) if all(isinstance(time, float) for time in times) else (times,):
         with pytest.raises(InputError, match=message):
             check_times(given)
     with pytest.raises(InputError, match=r"not a list|not a number|A ndarray"):
