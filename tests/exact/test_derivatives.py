@@ -18,6 +18,7 @@ from heavytop.exact.enclosure.step import Errors, Node, in_other_bits, start_nod
 from heavytop.exact.flint.balls import largest_singular_value, radius, relative_bits, working_precision
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
+from support.helpers import in_units
 
 GENERIC = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
 WITH_ROTOR = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"), rotor=("1/4", "-1/3", "2"))
@@ -210,9 +211,7 @@ def test_units_of_any_size_change_no_digit():
     """Ω = s ω, t = τ/s, n = s² ν: the derivatives are those of ω with powers of s, exactly."""
     scale, time = Fraction(2) ** 300, Fraction(3, 2)
     plain, data = of(motion_of("generic"), time, data=True), True
-    large = HeavyTop((3, 2, 1), scale**2, ("1/2", "1/3", "1/5"))
-    fast = Validated(large, State([w * scale for w in START.omega], START.gamma))
-    found = of(fast, time / scale, data=data)
+    found = of(Validated(*in_units(GENERIC, START, scale)), time / scale, data=data)
     for i in SIX:
         for j in SIX:
             power = (i < 3) - (j < 3)

@@ -142,7 +142,6 @@ def test_a_step_that_words_cannot_hold_is_shortened():
     node = start_node(motion.field, motion.scaled.state, 138)
     assert certified.series(node.centre, -3) is None
     found = step(motion.field, type(node)(node.time, node.centre, node.errors, -3), 138, certified)
-    assert found is not None
     assert found.node.halvings > -3
     assert isinstance(found.series, WordSeries)
     assert isinstance(certified, CertifiedSeries)

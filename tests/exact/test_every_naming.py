@@ -21,6 +21,7 @@ from heavytop.exact.solution import hold
 from heavytop.measure.reference import reference
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
+from support.helpers import in_units
 from support.proofs import assert_overlap, attitude_of
 
 DIGITS, BITS, LENGTH = 40, 140, 14
@@ -120,6 +121,5 @@ def test_the_attitude_is_that_of_the_enclosure_under_an_odd_naming_and_in_any_un
 def in_other_units(top, start, rate, size):
     """The same motion with time in another unit, moments and weight in another, and weight against centre."""
     inertia, centre = [size * i for i in top.inertia], [r / size for r in top.centre]
-    rotor = top.rotor and [rate * size * k for k in top.rotor]
-    other = HeavyTop(inertia, top.weight * rate * rate * size * size, centre, rotor)
-    return other, State([rate * w for w in start.omega], start.gamma)
+    other = HeavyTop(inertia, top.weight * size * size, centre, top.rotor and [size * k for k in top.rotor])
+    return in_units(other, start, rate)

@@ -57,14 +57,6 @@ def raises(error):
     return peer
 
 
-zero = lambda *_, tolerance=None, **__: 1 / 0
-rude, mute, refuses = raises(Rude("stop")), raises(Mute()), raises(InputError("No.", "Never."))
-told = raises(ValueError("two\\nlines \\x1b[31m" + 5000 * "x"))
-deep = lambda *a, **k: deep(*a, **k)
-leaves = lambda *_, **__: sys.exit("goodbye")
-dies = lambda *_, **__: os.kill(os.getpid(), 11)
-
-
 def changed(**changes):
     def peer(*arguments, **options):
         run = honest(*arguments, **options)
@@ -72,56 +64,22 @@ def changed(**changes):
     return peer
 
 
-nothing = lambda *_, **__: None
-words = lambda *_, **__: "a string"
-states_alone = lambda *a, **k: honest(*a, **k).states
-few = changed(states=lambda run: run.states[:-1], times=lambda run: run.times[:-1])
-fewer_times = changed(times=lambda run: run.times[:-1])
-many = changed(states=lambda run: (*run.states, run.states[-1]))
-elsewhere = changed(times=lambda run: tuple(t + 1 for t in run.times))
-short = changed(states=lambda run: tuple(s[:5] for s in run.states))
-flat = changed(states=lambda run: tuple(x for s in run.states for x in s))
-imaginary = changed(states=lambda run: tuple(numpy.asarray(s) + 0j for s in run.states))
-objects = changed(states=lambda run: tuple(numpy.array(s, dtype=object) for s in run.states))
-texts = changed(states=lambda run: tuple([str(x) for x in s] for s in run.states))
-one_text = changed(states=lambda run: tuple("123456" for s in run.states))
-truths = changed(states=lambda run: tuple([True] * 6 for s in run.states))
-nan = changed(states=lambda run: tuple(s * numpy.nan for s in run.states))
-inf = changed(states=lambda run: tuple(s / 0 for s in run.states))
-diverged = changed(states=lambda run: (), times=lambda run: (), outcome=lambda run: Outcome.NON_FINITE)
-liar = changed(outcome=lambda run: Outcome.STEP_LIMIT)
-worded = changed(outcome=lambda run: "success")
-beyond = changed(
-    states=lambda run: (), times=lambda run: (), outcome=lambda run: Outcome.STEP_LIMIT,
-    time_reached=lambda run: 2 * run.time_reached,
-)
-overtaken = changed(
-    states=lambda run: run.states[:1], times=lambda run: run.times[:1], outcome=lambda run: Outcome.STEP_LIMIT,
-)
-behind = changed(
-    states=lambda run: run.states[:1], times=lambda run: run.times[:1], outcome=lambda run: Outcome.STEP_LIMIT,
-    time_reached=lambda run: run.times[0] / 2,
-)
-negative = changed(steps=lambda run: -1)
-half = changed(steps=lambda run: 1.5)
-untimed = changed(seconds=lambda run: {})
-instant = changed(seconds=lambda run: {"compile": 0.0, "run": float("nan")})
-flagged = changed(flags=lambda run: {"a": "b" * 10_000})
-nameless = changed(integrator=lambda run: None)
+def each(change):
+    return changed(states=lambda run: tuple(map(change, run.states)))
+
+
+def ended(count, reached):
+    return changed(
+        states=lambda run: run.states[:count], times=lambda run: run.times[:count],
+        outcome=lambda run: Outcome.STEP_LIMIT, time_reached=reached,
+    )
 
 
 def solved(states):
     return double_peer("mine", 1, lambda given: Solved(states(given), 0.5, 1))
 
 
-double_nan = solved(lambda given: [[float("nan")] * 6] * len(given.times))
-double_text = solved(lambda given: [["1"] * 6] * len(given.times))
-double_complex = solved(lambda given: [[1j] * 6] * len(given.times))
-double_turned = solved(lambda given: numpy.zeros((6, 6))[:, : len(given.times)])
-double_flat = solved(lambda given: [0.0] * 6 * len(given.times))
-double_ragged = solved(lambda given: [[0.0] * 6, [0.0]])
-double_many = solved(lambda given: [[0.0] * 6] * (len(given.times) + 1))
-double_dict = double_peer("mine", 1, lambda given: {"states": []})
+dies = lambda *_, **__: os.kill(os.getpid(), 11)
 
 
 def chatty(top, start, times, precision, *, system, tolerance=None):
@@ -166,57 +124,65 @@ def spoil(given):
 double_vandal = double_peer("mine", 8, spoil)
 """
 FAILURES = {
-    "zero": "raised ZeroDivisionError: division by zero",
-    "rude": "raised Rude: stop",
-    "mute": "raised Mute",
-    "refuses": "raised InputError: No.",
-    "told": "raised ValueError: two lines",
-    "deep": "raised RecursionError",
-    "leaves": "called sys.exit(goodbye)",
-    "nothing": "returned a NoneType instead of a Trajectory",
-    "words": "returned a str instead of a Trajectory",
-    "states_alone": "returned a ndarray instead of a Trajectory",
-    "few": "1 of 2 states, and the outcome success",
-    "fewer_times": "returned other times",
-    "many": "returned 3 states for 2 times",
-    "elsewhere": "returned other times",
-    "short": "a state of 5 components",
-    "flat": "float64' object is not iterable",
-    "imaginary": "a complex128 in a state",
-    "objects": "an array of objects",
-    "texts": "a str_ in a state",
-    "one_text": "a str_ as a state",
-    "truths": "a bool in a state",
-    "nan": "a state that is not finite",
-    "inf": "a state that is not finite",
-    "diverged": "a state that is not finite after 0 of 2 times",
-    "liar": "2 of 2 states, and the outcome step_limit",
-    "worded": "the outcome 'success' instead of a member of Outcome",
-    "beyond": "as reached",
-    "overtaken": "states, and said that it reached t = ",
-    "behind": "states, and said that it reached t = ",
-    "negative": "a negative count of steps",
-    "half": "steps that are no count",
-    "untimed": "raised KeyError: 'compile' in what it returned",
-    "instant": "seconds that are none",
-    "flagged": "flags that are not short texts",
-    "nameless": "no name of an integrator",
-    "double_nan": "a state that is not finite",
-    "double_text": "returned states of <U1",
-    "double_complex": "returned states of complex128",
-    "double_turned": "of the shape (6, 2)",
-    "double_flat": "of the shape (12,)",
-    "double_ragged": "raised ValueError",
-    "double_many": "of the shape (3, 6) for 2 times",
-    "double_dict": "returned a dict instead of Solution",
+    "zero": ("lambda *_, tolerance=None, **__: 1 / 0", "raised ZeroDivisionError: division by zero"),
+    "rude": ('raises(Rude("stop"))', "raised Rude: stop"),
+    "mute": ("raises(Mute())", "raised Mute"),
+    "refuses": ('raises(InputError("No.", "Never."))', "raised InputError: No."),
+    "told": ('raises(ValueError("two\\nlines \\x1b[31m" + 5000 * "x"))', "raised ValueError: two lines"),
+    "deep": ("lambda *a, **k: deep(*a, **k)", "raised RecursionError"),
+    "leaves": ('lambda *_, **__: sys.exit("goodbye")', "called sys.exit(goodbye)"),
+    "nothing": ("lambda *_, **__: None", "returned a NoneType instead of a Trajectory"),
+    "words": ('lambda *_, **__: "a string"', "returned a str instead of a Trajectory"),
+    "states_alone": ("lambda *a, **k: honest(*a, **k).states", "returned a ndarray instead of a Trajectory"),
+    "few": (
+        "changed(states=lambda run: run.states[:-1], times=lambda run: run.times[:-1])",
+        "1 of 2 states, and the outcome success",
+    ),
+    "fewer_times": ("changed(times=lambda run: run.times[:-1])", "returned other times"),
+    "many": ("changed(states=lambda run: (*run.states, run.states[-1]))", "returned 3 states for 2 times"),
+    "elsewhere": ("changed(times=lambda run: tuple(t + 1 for t in run.times))", "returned other times"),
+    "short": ("each(lambda s: s[:5])", "a state of 5 components"),
+    "flat": ("changed(states=lambda run: tuple(x for s in run.states for x in s))", "float64' object is not iterable"),
+    "imaginary": ("each(lambda s: numpy.asarray(s) + 0j)", "a complex128 in a state"),
+    "objects": ("each(lambda s: numpy.array(s, dtype=object))", "an array of objects"),
+    "texts": ("each(lambda s: [str(x) for x in s])", "a str_ in a state"),
+    "one_text": ('each(lambda s: "123456")', "a str_ as a state"),
+    "truths": ("each(lambda s: [True] * 6)", "a bool in a state"),
+    "nan": ("each(lambda s: s * numpy.nan)", "a state that is not finite"),
+    "inf": ("each(lambda s: s / 0)", "a state that is not finite"),
+    "diverged": (
+        "changed(states=lambda run: (), times=lambda run: (), outcome=lambda run: Outcome.NON_FINITE)",
+        "a state that is not finite after 0 of 2 times",
+    ),
+    "liar": ("changed(outcome=lambda run: Outcome.STEP_LIMIT)", "2 of 2 states, and the outcome step_limit"),
+    "worded": ('changed(outcome=lambda run: "success")', "the outcome 'success' instead of a member of Outcome"),
+    "beyond": ("ended(0, lambda run: 2 * run.time_reached)", "as reached"),
+    "overtaken": ("ended(1, lambda run: run.time_reached)", "states, and said that it reached t = "),
+    "behind": ("ended(1, lambda run: run.times[0] / 2)", "states, and said that it reached t = "),
+    "negative": ("changed(steps=lambda run: -1)", "a negative count of steps"),
+    "half": ("changed(steps=lambda run: 1.5)", "steps that are no count"),
+    "untimed": ("changed(seconds=lambda run: {})", "raised KeyError: 'compile' in what it returned"),
+    "instant": ('changed(seconds=lambda run: {"compile": 0.0, "run": float("nan")})', "seconds that are none"),
+    "flagged": ('changed(flags=lambda run: {"a": "b" * 10_000})', "flags that are not short texts"),
+    "nameless": ("changed(integrator=lambda run: None)", "no name of an integrator"),
+    "double_nan": ('solved(lambda given: [[float("nan")] * 6] * len(given.times))', "a state that is not finite"),
+    "double_text": ('solved(lambda given: [["1"] * 6] * len(given.times))', "returned states of <U1"),
+    "double_complex": ("solved(lambda given: [[1j] * 6] * len(given.times))", "returned states of complex128"),
+    "double_turned": ("solved(lambda given: numpy.zeros((6, 6))[:, : len(given.times)])", "of the shape (6, 2)"),
+    "double_flat": ("solved(lambda given: [0.0] * 6 * len(given.times))", "of the shape (12,)"),
+    "double_ragged": ("solved(lambda given: [[0.0] * 6, [0.0]])", "raised ValueError"),
+    "double_many": ("solved(lambda given: [[0.0] * 6] * (len(given.times) + 1))", "of the shape (3, 6) for 2 times"),
+    "double_dict": ('double_peer("mine", 1, lambda given: {"states": []})', "returned a dict instead of Solution"),
 }
+"""Each peer, and what is said of it."""
 HARMLESS = ("honest", "chatty", "rude_to_the_process", "vandal", "double_vandal")
 
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Another package with one peer of every kind."""
-    (tmp_path / "others.py").write_text(MODULE)
+    failing = "".join(f"{name} = {code}\n" for name, (code, _) in FAILURES.items())
+    (tmp_path / "others.py").write_text(MODULE + failing)
     (tmp_path / "others_broken.py").write_text("print('hello')\nimport sys\nsys.exit(3)")
     peers = {name: f"others:{name}" for name in (*FAILURES, *HARMLESS, "dies")}
     named_peers(tmp_path, peers | {"exits": "others_broken:x", "absent": "nowhere:x", "lacks": "others:not_there"})
@@ -239,7 +205,7 @@ def test_a_peer_that_fails_says_what_it_did(package: Path, name: str, capfd) -> 
     with pytest.raises(PeerFailed) as caught:
         peer(CASE.top, CASE.start, TIMES, DOUBLE)
     assert caught.value.cause.startswith(f"mine:{name} ") or name.startswith("double")
-    assert FAILURES[name] in caught.value.cause
+    assert FAILURES[name][1] in caught.value.cause
     assert len(caught.value.cause) < 350
     assert caught.value.cause.isprintable()
     assert capfd.readouterr() == ("", "")

@@ -15,6 +15,7 @@ from heavytop.integrate.registry import INTEGRATORS, MOST_STEPS, require_reach
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.multiword.fixed_point.fixed_point_run import LONGEST_STEP
 from heavytop.top.equations import square_of_rate
+from support.helpers import in_units
 from support.reports import expand, load, rows
 
 TOP = ht.HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
@@ -28,12 +29,6 @@ FAST = {
     "precession of unequal moments": (ht.HeavyTop((2, "1e-8", 1), 0, (0, 0, 0)), ht.State((0, 0, "1.4e-4"), LEANING)),
 }
 """Motions that change at a rate of about 1 in units of time of 1, each for another reason."""
-
-
-def in_units(top: ht.HeavyTop, start: ht.State, rate: Fraction) -> tuple[ht.HeavyTop, ht.State]:
-    return ht.HeavyTop(top.inertia, top.weight * rate**2, top.centre), ht.State(
-        [rate * w for w in start.omega], start.gamma
-    )
 
 
 def given(top: ht.HeavyTop, start: ht.State) -> Problem:

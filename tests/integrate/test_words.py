@@ -25,7 +25,7 @@ from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision,
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
-from support.helpers import VECTORS, bits, distance, start_of, top_of, unit_vector
+from support.helpers import VECTORS, bits, distance, in_units, start_of, top_of, unit_vector
 
 TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
 START = State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5"))
@@ -137,9 +137,7 @@ def test_the_attitude_rides_along_and_stays_orthonormal(system) -> None:
 def test_units_of_time_and_weight_change_nothing_but_the_units(precision, exponent: int) -> None:
     """The same motion with Ω in other units: the same error relative to Ω, a step less or more at the end."""
     unit = Fraction(10) ** exponent
-    start = State([w * unit for w in START.omega], START.gamma)
-    top = HeavyTop(GENERIC.inertia, unit**2, GENERIC.centre)
-    run = propagate_multiword(top, start, [5 / unit], precision)
+    run = propagate_multiword(*in_units(GENERIC, START, unit), [5 / unit], precision)
     same = Problem.of(HeavyTop(run.problem.top.inertia, 1, run.problem.top.moment), run.problem.start, real(300))
     wide = propagate(same.top, same.start, run.times, real(300))
     for low, size in ((0, unit), (3, 1)):

@@ -28,6 +28,7 @@ from heavytop.records import Against
 from heavytop.top.equations import SYSTEMS, Parameters, holding, kovalevskaya_yehia
 from heavytop.top.equations import sretensky as sretensky_integral
 from heavytop.top.heavy_top import HeavyTop, State
+from support.helpers import in_units
 
 TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
 START = State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5"))
@@ -122,11 +123,7 @@ def balls_counted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 def test_many_states_at_once_have_the_drift_of_exact_fractions(monkeypatch, precision, scale: Fraction) -> None:
     """All digits of all numbers, and by arrays: in units of time from 1e-15 to 1e15."""
     random = Random(f"{precision} {scale}")
-    problem = Problem.of(
-        HeavyTop(TOP.inertia, TOP.weight * scale**2, TOP.centre),
-        State([w * scale for w in START.omega], START.gamma),
-        precision,
-    )
+    problem = Problem.of(*in_units(TOP, START, scale), precision)
     rows = near_the_start(problem, 300, random)
     counted, drift = balls_counted(monkeypatch), Drift(problem, problem.integrals())
     drift.add_states(rows)
@@ -146,9 +143,7 @@ def test_many_states_at_once_have_the_drift_of_exact_fractions(monkeypatch, prec
 @pytest.mark.parametrize("exponent", [-100, -80, -36, -21, -19, 19, 20, 36, 100])
 def test_at_odd_scales_numbers_are_those_of_balls(monkeypatch, exponent: int) -> None:
     """Where words overflow or underflow, just beyond and far, balls are evaluated of each state."""
-    scale = Fraction(10) ** exponent
-    top = HeavyTop(TOP.inertia, TOP.weight * scale**2, TOP.centre)
-    problem = Problem.of(top, State([w * scale for w in START.omega], START.gamma), DOUBLE)
+    problem = Problem.of(*in_units(TOP, START, Fraction(10) ** exponent), DOUBLE)
     rows = near_the_start(problem, 160, Random(exponent))
     one_by_one = Drift(problem, problem.integrals())
     one_by_one.one_by_one()

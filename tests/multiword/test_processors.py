@@ -40,7 +40,6 @@ def floating(attitude: bool, tolerance: Fraction, processor: Processor | None) -
 def certified(processor: Processor | None) -> object:
     motion, grid = some_motion(Random(5), attitude=True), grid_of(4, whole=True)
     found = CertifiedSeries(motion.scaled, grid, True, processor=processor).series(rounded(motion, grid), 3)
-    assert found is not None
     return found.values, found.rounding
 
 

@@ -68,6 +68,13 @@ def random_parameters(random: Random, system: System, unit: Fraction = Fraction(
     )
 
 
+def in_units(top: HeavyTop, start: State, rate: Fraction) -> tuple[HeavyTop, State]:
+    """The same motion in a unit of time in which all of it is ``rate`` times as fast."""
+    rotor = top.rotor and [rate * k for k in top.rotor]
+    other = HeavyTop(top.inertia, top.weight * rate**2, top.centre, rotor)
+    return other, State([rate * w for w in start.omega], start.gamma)
+
+
 def renamed(values: Sequence[Any], axes: Sequence[int]) -> list[Any]:
     """Canonical values put on the axes (i, j, k)."""
     found: list[Any] = [0, 0, 0]

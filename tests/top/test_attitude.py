@@ -44,7 +44,6 @@ def test_r_of_a_rational_quaternion_of_any_length_is_a_rational_rotation() -> No
     random = Random(1)
     for _ in range(30):
         rows = Attitude.quaternion(*random_quaternion(random), normalize=True).exact_rows()
-        assert rows is not None
         assert multiplied(rows, transposed(rows)) == IDENTITY
         assert rows[1] == cross(rows[2], rows[0])  # eta = gamma x xi
         assert rows_of(rows[2], rows[0]) == rows
@@ -148,7 +147,6 @@ def test_a_matrix_is_exact_or_refused() -> None:
     with pytest.raises(InputError, match="not orthogonal"):
         Attitude.matrix(rounded)
     near = Attitude.matrix(rounded, normalize=True).exact_rows()
-    assert near is not None
     assert multiplied(near, transposed(near)) == IDENTITY
     assert flat(near) == pytest.approx([float(value) for row in rounded for value in row], abs=2e-6)
 
