@@ -141,11 +141,12 @@ def test_an_equilibrium_and_units_of_any_size(name: str) -> None:
         assert_as_one_by_one(name, late, case=replace(CASE, top=top, start=start))
 
 
-def test_a_run_of_few_steps_between_many_times_is_one_call(monkeypatch: pytest.MonkeyPatch) -> None:
-    taken = []
-    monkeypatch.setattr(motions.Stepper, "sample", lambda *_: taken.append(1))
-    assert len(run_of("heyoka", regular(1000, 50)).states) == 1001
-    assert taken == []
+@pytest.mark.parametrize("last", [50, -10_000])
+def test_many_samples_are_one_call_of_the_same_bits(last: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    times = regular(300, last)
+    assert_as_one_by_one("heyoka", times)
+    monkeypatch.setattr(motions.Stepper, "sample", lambda *_: pytest.fail("a sample of its own"))
+    assert len(run_of("heyoka", times).states) == 301
 
 
 @pytest.mark.parametrize(("name", "most"), [("heyoka", 5), ("multiword", 8)])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache
@@ -36,9 +36,10 @@ from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
 
 
 CHUNK_SECONDS = 0.25
-_ON_A_GRID = ("double", "extended", "quad")
-_MANY, _CLOSE = 256, 20
+_MANY, _CLOSE = 256, 400
 """States at so many times, with at most so many steps between two of them, are computed in one call of heyoka."""
+_ON_A_GRID = {"double": 500_000, "extended": 100_000, "quad": 10_000}
+"""The most steps of such a call, which cannot be interrupted: about a second."""
 _GROWTH = 16
 """At most so many times the steps so far are taken at once: few steps say little about the longest."""
 _SLOWEST, _FASTEST = Fraction(1, 2**48), Fraction(2) ** 55
@@ -84,7 +85,8 @@ class Stepper(SampledRun):
         return outcome, self.sample(target) if outcome is Outcome.SUCCESS else None
 
     def _beyond(self, target: OrderedRing) -> bool:
-        return bool(self.engine.time >= target if self.forwards else self.engine.time <= target)
+        reached = self.engine.dtime  # its sum is the exact time, by which heyoka's grid decides
+        return bool(reached >= (target, 0.0) if self.forwards else reached <= (target, 0.0))
 
     def _steps_short_of(self, target: OrderedRing) -> int:
         """How many steps as long as the longest lie before the target and a quarter of a second."""
@@ -166,36 +168,6 @@ class Stepper(SampledRun):
         if self.rest is not None:
             return self.rest.copy()
         return self.engine.update_d_output(target).copy()
-
-
-def on_a_grid(engine: Any, targets: Sequence[Any], precision: Precision, most: int | None) -> tuple[int, Any] | None:
-    """Steps taken from t = 0 to the last of ``targets``, and the states at all of them, an array of shape (n, 6 or 9).
-
-    The same bits as :class:`Stepper`, in one call of heyoka.  The grid ends at a time beyond every other, so that no
-    step is cut; the run stops after the step that covers the last target.  None for a run that ends otherwise, or takes
-    more than ``most`` steps: the state of the engine is then undefined.
-    """
-    last = targets[-1]
-    if precision.family == "double":
-        last = float(last)  # compared at every step: numpy's numbers take longer
-
-    def proceed() -> Generator[bool, Any, None]:
-        before, stepped = engine.time, (yield True)
-        while before < (reached := stepped.time) < last:
-            before, stepped = reached, (yield True)
-        while before > (reached := stepped.time) > last:
-            before, stepped = reached, (yield True)
-        yield False
-
-    answers = proceed()  # at every step: resuming a generator takes half as long as a call
-    next(answers)
-    end = far(bool(targets[-1] >= 0), precision)
-    start = [] if targets[0] == 0 else [engine.time]
-    grid = numpy.concatenate([numpy.array([*start, targets[0]]), numpy.array(targets[1:]), numpy.array([end])])
-    _, _, _, steps, _, states = engine.propagate_grid(grid, callback=answers.send, max_steps=most or 0)
-    if len(states) != len(grid) - 1 or not numpy.isfinite(states[-1]).all():
-        return None
-    return steps, states[len(start) :]
 
 
 @lru_cache(maxsize=64)
@@ -364,18 +336,28 @@ def states_at(
 def _at_once(
     engine: Any, begin: Callable[[], None], targets: Sequence[Any], step_limit: int | None, precision: Precision
 ) -> tuple[int, Any] | None:
-    """Steps and states at many targets close to each other, in one call; None for few targets, and where it fails.
+    """Steps and states at many targets, with the bits of :class:`Stepper`, in one call of heyoka.
 
     begin: sets the engine to the beginning; called first to measure the first step, and again for the run.
+    heyoka cuts the last step alone, whose polynomial does not depend on its length.  None for few targets and for long
+    runs, and where the call does not reach the last target; the state of the engine is then undefined.
     """
-    if len(targets) < _MANY or precision.family not in _ON_A_GRID:
+    most = _ON_A_GRID.get(precision.family, 0)
+    if len(targets) < _MANY:
         return None
     begin()
-    engine.propagate_until(far(bool(targets[-1] >= 0), precision), max_steps=1)
-    if abs(float(targets[-1])) > _CLOSE * len(targets) * abs(float(engine.time)):
+    end = far(bool(targets[-1] >= 0), precision)
+    engine.propagate_until(end, max_steps=1)
+    shortest = abs(float(targets[-1])) / min(_CLOSE * len(targets), most)
+    if engine.time == end or abs(float(engine.time)) < shortest:  # at rest, or a long run
         return None
     begin()
-    return on_a_grid(engine, targets, precision, step_limit)
+    start = [] if targets[0] == 0 else [engine.time]
+    grid = numpy.concatenate([numpy.array([*start, targets[0]]), numpy.array(targets[1:])])
+    _, _, _, steps, _, states = engine.propagate_grid(grid, max_steps=min(step_limit or most, most))
+    if len(states) != len(grid) or not numpy.isfinite(states[-1]).all():
+        return None
+    return steps, states[len(start) :]
 
 
 def _trajectory(tool: Compiled, problem: Problem, run: Stepper, *ended: *Ended) -> Trajectory:
