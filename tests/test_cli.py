@@ -17,51 +17,25 @@ from typer.testing import CliRunner
 from heavytop.cli import app
 from heavytop.version import commit
 from support import in_process
-from support.helpers import VECTORS
+from support.helpers import VECTORS, options, python
+from support.reports import drift, plan_file
 
 pytestmark = pytest.mark.slow
 
 COMMAND = [sys.executable, "-m", "heavytop"]
-TINY = """name = "tiny"
-[[measure]]
-kind = "drift"
-cases = ["euler", "kovalevskaya"]
-runs = [{ precision = "double", horizon = "20", samples = 20 }]
-[[measure]]
-kind = "local_error"
-cases = ["euler"]
-precisions = ["double"]
-horizon = "1"
-"""
 
 
+STEPS = '[[measure]]\nkind = "local_error"\ncases = ["euler"]\nprecisions = ["double"]\nhorizon = "1"\n'
 run = in_process.heavytop
-
-
-def started(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    """The command in a process of its own."""
-    return subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, cwd=cwd, timeout=120, check=False)
-
-
-def top_options(**changes: str) -> list[str]:
-    options = {
-        "inertia": "3,2,1",
-        "weight": "1",
-        "centre": "1/2,1/3,1/5",
-        "omega": "1/10,2/5,9/10",
-        "gamma": "3/5,0,4/5",
-        "times": "8",
-    } | changes
-    return [part for name, value in options.items() for part in (f"--{name}", value)]
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("tiny")
-    (folder / "tiny.toml").write_text(TINY)
+    plan_file(folder, drift("euler", "kovalevskaya", runs=[("double", "20", 20)]) + STEPS)
     for name in ("one", "two"):
-        options = ["--workers", "1", *(["--parquet"] if name == "two" else [])]
-        done = run("run", "--plan", "tiny.toml", "--out", name, *options, cwd=folder)
+        more = ["--workers", "1", *(["--parquet"] if name == "two" else [])]
+        done = run("run", "--plan", "plan.toml", "--out", name, *more, cwd=folder)
         assert done.returncode == 0, done.stderr
         assert f"{name}/report.json" in done.stdout
         assert "Traceback" not in done.stderr
@@ -70,7 +44,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_propagate_gives_full_precision_strings_that_meet_the_reference() -> None:
     given = VECTORS[0]
-    done = run("propagate", *top_options(times="1,8"), "--precision", "quad", "--json")
+    done = run("propagate", *options(times="1,8"), "--precision", "quad", "--json")
     assert done.returncode == 0, done.stderr
     answer = json.loads(done.stdout)
     assert [answer[key] for key in ("precision", "bits", "system", "outcome")] == ["quad", 113, "heavy_top", "success"]
@@ -81,46 +55,35 @@ def test_propagate_gives_full_precision_strings_that_meet_the_reference() -> Non
 
 
 def test_propagate_prints_for_people_and_carries_the_attitude() -> None:
-    done = run("propagate", *top_options(), "--attitude")
+    done = run("propagate", *options(), "--attitude")
     assert done.returncode == 0
     assert "reached every time asked for" in done.stdout
     assert "ψ" in done.stdout
     assert "energy" in done.stdout
-    answer = json.loads(run("propagate", *top_options(), "--attitude", "--json").stdout)
+    answer = json.loads(run("propagate", *options(), "--attitude", "--json").stdout)
     assert len(answer["states"][0]) == 6
     assert len(answer["attitude"][0]) == len(answer["angles"][0]) == 3
     assert "drift_xi_squared_max" in answer["metrics"]
 
 
 def test_a_run_that_stops_early_is_incomplete_and_keeps_what_it_reached() -> None:
-    done = run("propagate", *top_options(times="1,2,900"), "--max-steps", "40", "--json")
+    done = run("propagate", *options(times="1,2,900"), "--max-steps", "40", "--json")
     assert done.returncode == 3
     answer = json.loads(done.stdout)
     assert answer["outcome"] == "step_limit"
     assert len(answer["states"]) == len(answer["times"]) == 2
-    assert "stopped" in run("propagate", *top_options(times="1,2,900"), "--max-steps", "40").stdout
-    done = run("propagate", *top_options(omega="1e140,1e140,1", times="8e-140"), "--json")
+    assert "stopped" in run("propagate", *options(times="1,2,900"), "--max-steps", "40").stdout
+    done = run("propagate", *options(omega="1e140,1e140,1", times="8e-140"), "--json")
     assert (done.returncode, json.loads(done.stdout)["outcome"]) == (0, "success")
 
 
 @pytest.mark.parametrize(
     ("changes", "more", "message"),
     [
-        ({"inertia": "3,0,1"}, [], "I2 = 0 is not positive"),
-        ({"inertia": "3,-2,1"}, [], "I2 = -2 is not positive"),
         ({"inertia": "3,2"}, [], "--inertia has 2 numbers"),
         ({"omega": "1,x,2"}, [], "--omega: 'x' is not a finite number"),
-        ({"omega": "1,nan,2"}, [], "'nan' is not a finite number"),
-        ({"weight": "inf"}, [], "--weight: 'inf' is not a finite number"),
         ({"gamma": "1,1,0"}, [], "--normalize"),
         ({"gamma": "0,0,0"}, ["--normalize"], "zero vector"),
-        ({"times": ""}, [], "not a finite number"),
-        ({"times": "2,1"}, [], "does not come after"),
-        ({"times": "1,1"}, [], "does not come after"),
-        ({"times": "-1,1"}, [], "different signs"),
-        ({}, ["--precision", "float"], "Unknown precision 'float'"),
-        ({}, ["--precision", "real:12"], "24 to 20000"),
-        ({}, ["--system", "spinning"], "Unknown system 'spinning'"),
         ({}, ["--system", "gyrostat"], "centre of mass on axis 2"),
         ({"centre": "0,1,0"}, ["--system", "gyrostat"], "parallel to M"),
         ({"centre": "0,1,0", "omega": "0,1,0"}, ["--system", "gyrostat"], "M·gamma != 0"),
@@ -137,7 +100,7 @@ def test_a_run_that_stops_early_is_incomplete_and_keeps_what_it_reached() -> Non
     ],
 )
 def test_bad_input_gets_a_clear_error_and_exit_2(changes, more, message) -> None:
-    done = run("propagate", *top_options(**changes), *more, "--json")
+    done = run("propagate", *options(**changes), *more, "--json")
     assert done.returncode == 2
     assert message in done.stderr
     assert done.stdout == ""
@@ -145,7 +108,7 @@ def test_bad_input_gets_a_clear_error_and_exit_2(changes, more, message) -> None
 
 
 def test_normalize_moves_gamma_onto_the_sphere() -> None:
-    done = run("propagate", *top_options(gamma="1,1,0"), "--normalize", "--json")
+    done = run("propagate", *options(gamma="1,1,0"), "--normalize", "--json")
     assert done.returncode == 0
     gamma = [Fraction(v) for v in json.loads(done.stdout)["states"][0][3:]]
     assert abs(sum(g * g for g in gamma) - 1) < Fraction(1, 10**13)
@@ -153,16 +116,14 @@ def test_normalize_moves_gamma_onto_the_sphere() -> None:
 
 def test_a_format_whose_steps_take_long_is_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("heavytop.cli.motions._SLOW_BITS", 100)
-    done = CliRunner().invoke(
-        app, ["propagate", *top_options(), "--precision", "real:100", "--max-steps", "1", "--json"]
-    )
+    done = CliRunner().invoke(app, ["propagate", *options(), "--precision", "real:100", "--max-steps", "1", "--json"])
     assert done.exit_code == 3
     assert "warning: in real:100 a step sums a Taylor series of order 35: seconds" in done.stderr
     assert json.loads(done.stdout)["outcome"] == "step_limit"
 
 
 def test_moments_that_no_body_has_are_a_warning() -> None:
-    done = run("propagate", *top_options(inertia="9,2,1"), "--json")
+    done = run("propagate", *options(inertia="9,2,1"), "--json")
     assert done.returncode == 0
     assert "no rigid body has such moments" in done.stderr
     json.loads(done.stdout)
@@ -188,29 +149,6 @@ def test_show_and_compare_print_for_people(finished: Path) -> None:
     assert "kovalevskaya" in shown.stdout
     compared = run("compare", "one", "two", cwd=finished)
     assert compared.stdout.startswith("Verdict: same (")
-
-
-def test_a_worse_report_is_found_with_exit_1(finished: Path) -> None:
-    report = json.loads((finished / "one" / "report.json").read_text())
-    metric = report["rows"][0]["metrics"]["drift_energy_max"]
-    metric["value"], metric["log10"] = "0.1", -1.0
-    (finished / "worse.json").write_text(json.dumps(report))
-    done = run("compare", "one", "worse.json", "--json", cwd=finished)
-    assert done.returncode == 1
-    answer = json.loads(done.stdout)
-    assert answer["verdict"] == "worse"
-    (found,) = [row for row in answer["rows"] if row["verdict"] == "worse"]
-    assert found["case"] == "euler"
-    assert found["metric"] == "drift_energy_max"
-    assert run("compare", "worse.json", "one", cwd=finished).returncode == 0
-
-
-def test_a_missing_row_is_incomparable_with_exit_3(finished: Path) -> None:
-    report = json.loads((finished / "one" / "report.json").read_text())
-    report["rows"].pop()
-    (finished / "less.json").write_text(json.dumps(report))
-    assert run("compare", "one", "less.json", cwd=finished).returncode == 3
-    assert run("compare", "less.json", "one", cwd=finished).returncode == 0
 
 
 def test_rows_as_parquet_come_with_the_run_or_from_its_report(finished: Path, tmp_path: Path) -> None:
@@ -239,7 +177,7 @@ def test_parquet_without_pyarrow_is_refused_before_anything_runs(
 
 def test_compare_and_show_refuse_what_is_no_report(finished: Path) -> None:
     (finished / "cut.json").write_text((finished / "one" / "report.json").read_text()[:500])
-    for arguments in (["show", "nowhere"], ["show", "cut.json"], ["compare", "one", "cut.json"], ["show", "tiny.toml"]):
+    for arguments in (["show", "nowhere"], ["show", "cut.json"], ["compare", "one", "cut.json"], ["show", "plan.toml"]):
         done = run(*arguments, cwd=finished)
         assert done.returncode == 2
         assert "heavytop: " in done.stderr
@@ -250,12 +188,12 @@ def test_compare_and_show_refuse_what_is_no_report(finished: Path) -> None:
 
 
 def test_a_folder_with_other_content_is_left_alone(tmp_path: Path) -> None:
-    (tmp_path / "tiny.toml").write_text(TINY)
+    plan_file(tmp_path, STEPS)
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "precious.txt").write_text("keep me")
     (tmp_path / "file").write_text("")
     for out, message in (("out", "already holds precious.txt"), ("file", "is a file")):
-        done = run("run", "--plan", "tiny.toml", "--out", out, cwd=tmp_path)
+        done = run("run", "--plan", "plan.toml", "--out", out, cwd=tmp_path)
         assert done.returncode == 2
         assert message in done.stderr
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["precious.txt"]
@@ -264,10 +202,8 @@ def test_a_folder_with_other_content_is_left_alone(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--plan", "huge"], "Unknown plan 'huge'"),
         (["--plan", "none.toml"], "as --plan gate; `heavytop new`"),
         (["--plan", "bad.toml"], "unknown field `surprise`"),
-        (["--workers", "0"], "workers must be at least 1; got 0"),
         (["--resume"], "--out"),
     ],
 )
@@ -304,7 +240,7 @@ def test_ctrl_c_ends_a_propagation_within_two_seconds_of_processor_time_with_exi
 ) -> None:
     """While libraries load, while heyoka compiles, while it integrates: ``after`` is processor time."""
     process = subprocess.Popen(
-        [*COMMAND, "propagate", *top_options(times="1e12", integrator=integrator)],
+        [*COMMAND, "propagate", *options(times="1e12", integrator=integrator)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -321,7 +257,7 @@ def test_ctrl_c_ends_a_propagation_within_two_seconds_of_processor_time_with_exi
 
 
 def test_the_version_is_that_of_the_package_with_its_commit() -> None:
-    done = started("--version")
+    done = python("-m", "heavytop", "--version")
     made_from = commit()
     told = f" (commit {made_from})" if made_from else ""
     assert (done.returncode, done.stdout) == (0, f"heavytop {version('heavytop')}{told}\n")
@@ -332,9 +268,10 @@ def test_help_lists_the_commands_and_loads_nothing_heavy() -> None:
     assert done.returncode == 0
     for name in ("run", "propagate", "compare", "score", "show", "list"):
         assert name in done.stdout
-    code = "import sys; sys.argv = ['heavytop', '--help']\nfrom heavytop.__main__ import main\ntry: main()\nexcept SystemExit: pass\nprint([m for m in ('heyoka', 'numpy', 'flint', 'matplotlib', 'sympy', 'distributed') if m in sys.modules], file=sys.stderr)"  # noqa: E501
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stderr.strip() == "[]"
+    heavy = {"heyoka", "numpy", "flint", "matplotlib", "sympy", "distributed"}
+    said = f"atexit.register(lambda: print({heavy} & sys.modules.keys()))"
+    done = python("-c", f"import atexit, sys; from heavytop.__main__ import main; {said}; main()", "--help")
+    assert done.stdout.splitlines()[-1] == "set()"
 
 
 def test_list_names_cases_plans_systems_and_formats() -> None:
@@ -346,7 +283,7 @@ def test_list_names_cases_plans_systems_and_formats() -> None:
 
 def test_reference_gives_proven_values_that_enclose_the_vectors() -> None:
     given = VECTORS[0]
-    done = run("reference", *top_options(times="1,8"), "--digits", "60", "--json")
+    done = run("reference", *options(times="1,8"), "--digits", "60", "--json")
     assert done.returncode == 0, done.stderr
     answer = json.loads(done.stdout)
     assert answer["digits"] == 60
@@ -359,8 +296,8 @@ def test_reference_gives_proven_values_that_enclose_the_vectors() -> None:
 
 
 def test_reference_of_the_gyrostat_uses_its_closed_form() -> None:
-    options = top_options(inertia="6,6,1", weight="1", centre="0,15,0", omega="0,0,6", gamma="0,0,1", times="-3")
-    done = run("reference", *options, "--system", "gyrostat", "--digits", "40")
+    given = options(inertia="6,6,1", weight="1", centre="0,15,0", omega="0,0,6", gamma="0,0,1", times="-3")
+    done = run("reference", *given, "--system", "gyrostat", "--digits", "40")
     assert done.returncode == 0, done.stderr
     assert "(4.2)-(4.6)" in done.stdout
     assert "±" in done.stdout
@@ -370,7 +307,6 @@ def test_reference_of_the_gyrostat_uses_its_closed_form() -> None:
     ("changes", "more", "code", "message"),
     [
         ({}, ["--digits", "20001"], 2, "1 to 20000"),
-        ({}, ["--digits", "0"], 2, "1 to 20000"),
         ({}, ["--digits", "many"], 2, "--digits"),
         ({"times": "inf"}, [], 2, "not a finite number"),
         ({"gamma": "1,1,1"}, [], 2, "--normalize"),
@@ -380,35 +316,11 @@ def test_reference_of_the_gyrostat_uses_its_closed_form() -> None:
     ],
 )
 def test_reference_refuses_what_it_cannot_prove(changes, more, code, message) -> None:
-    done = run("reference", *top_options(**changes), *more, "--json")
+    done = run("reference", *options(**changes), *more, "--json")
     assert done.returncode == code
     assert message in done.stderr
     assert done.stdout == ""
     assert "Traceback" not in done.stderr
-
-
-@pytest.mark.parametrize("precision", ["double", "double-double", "quad", "real:300"])
-def test_propagate_by_words_says_what_it_is(precision: str) -> None:
-    common = "--inertia 3,2,1 --weight 1 --centre 1/2,1/3,1/5 --omega 1/10,2/5,9/10 --gamma 3/5,0,4/5 --times -1,-2"
-    done = run(
-        "propagate", *common.split(), "--precision", precision, "--integrator", "multiword", "--attitude", "--json"
-    )
-    assert done.returncode == 0
-    document = json.loads(done.stdout)
-    assert document["integrator"] == "multiword"
-    assert document["precision"] == precision
-    assert document["outcome"] == "success"
-    assert {"words", "bits", "step_rule", "tolerance"} <= set(document["flags"])
-    assert len(document["angles"]) == len(document["states"]) == 2
-
-
-def test_an_integrator_that_is_none_and_a_format_that_heyoka_lacks_are_refused() -> None:
-    common = "--inertia 3,2,1 --weight 1 --centre 1/2,1/3,1/5 --omega 1/10,2/5,9/10 --gamma 3/5,0,4/5 --times 1"
-    for options, words in (("--integrator euler", "`heavytop list`"), ("--precision double-double", "multiword")):
-        done = run("propagate", *common.split(), *options.split())
-        assert done.returncode == 2
-        assert words in done.stderr
-        assert "Traceback" not in done.stderr
 
 
 def test_a_gate_without_a_baseline_names_the_command_that_makes_it(tmp_path: Path) -> None:

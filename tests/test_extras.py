@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 import tomllib
 from collections.abc import Callable
@@ -14,6 +13,7 @@ import pytest
 
 from heavytop import extras
 from heavytop.errors import MissingExtra
+from support.helpers import python
 from support.in_process import HERE
 from without_extras import CORE, MOTION, NEEDS, says_so, without
 
@@ -64,5 +64,4 @@ import mpmath, sympy
 assert (sympy.Integer(1), mpmath.mpf(1)) == (1, 1)
 sys.exit(" ".join(loaded))
 """
-    done = subprocess.run([sys.executable, "-c", script, *command], capture_output=True, text=True, check=False)
-    assert done.stderr.strip() == modules
+    assert python("-c", script, *command).stderr.strip() == modules

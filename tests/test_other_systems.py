@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 
 import pytest
 
 from support import in_process
+from support.helpers import options, python
 
 pytestmark = pytest.mark.slow
 
@@ -47,14 +46,11 @@ done = CliRunner().invoke(app, sys.argv[1:])
 assert done.exception is None or done.exit_code == 0, done.output
 print(done.stdout)
 """
-OPTIONS = "--inertia 3,2,1 --weight 1 --centre 1/2,1/3,1/5 --omega 1/10,2/5,9/10 --gamma 3/5,0,4/5 --times 8 --json"
 
 
 def test_every_module_is_imported_and_a_motion_computed_without_what_unix_alone_has() -> None:
-    command = ["propagate", *OPTIONS.split()]
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, *command], capture_output=True, text=True, timeout=300, check=False
-    )
+    command = ["propagate", *options(), "--json"]
+    done = python("-c", PROGRAM, *command)
     assert done.returncode == 0, done.stderr
     there, here = json.loads(done.stdout), json.loads(in_process.heavytop(*command).stdout)
     assert there["outcome"] == "success"

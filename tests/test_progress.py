@@ -25,7 +25,7 @@ from heavytop.precision import DOUBLE
 from heavytop.records import SCHEMA, Report
 from heavytop.report.store import store
 from heavytop.top.equations import HEAVY_TOP
-from heavytop.top.heavy_top import HeavyTop, State
+from support.helpers import START, TOP, options, python
 
 
 class Clock:
@@ -145,23 +145,22 @@ def test_a_reference_reports_on_a_terminal_and_its_output_stays_clean() -> None:
     master, slave = pty.openpty()
     # drawn a hundred times a second: a fast machine is through in less than the half second between two draws
     script = "from heavytop.cli import output; from heavytop.__main__ import main; output._EVERY = 0.01; main()"
-    line = [sys.executable, "-c", script, "reference", "--inertia", "3,5/2,3/2", "--weight", "3/2"]
-    line += ["--centre", "1/2,1/3,1/5", "--omega", "1/10,2/5,9/10", "--gamma", "3/5,0,4/5", "--times", "300"]
+    asked = options(inertia="3,5/2,3/2", weight="3/2", times="300", digits="60")
+    line = [sys.executable, "-c", script, "reference", *asked, "--json"]
     environment = os.environ | {"TERM": "xterm", "COLUMNS": "100"}
-    line += ["--digits", "60", "--json"]
-    done = subprocess.run(line, stdout=subprocess.PIPE, stderr=slave, env=environment, timeout=120, check=True)
-    os.close(slave)
-    written = b""
-    while True:
+
+    def read() -> bytes:
         try:
-            part = os.read(master, 65536)
-        except OSError:
-            break
-        written += part
-        if not part:
-            break
+            return os.read(master, 65536)
+        except OSError:  # nobody holds the other end
+            return b""
+
+    with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=slave, env=environment) as process:
+        os.close(slave)
+        written = b"".join(iter(read, b""))
+        printed = process.stdout.read()
     os.close(master)
-    assert done.stdout.lstrip().startswith(b"{")
+    assert printed.lstrip().startswith(b"{")
     assert b" %" in written
     assert b"left" in written
 
@@ -172,15 +171,13 @@ def test_every_command_says_once_where_it_is_when_it_takes_long(
 ) -> None:
     monkeypatch.setattr(output, "SILENCE", 0.0)
     said = set()
-    data = ["--inertia", "3,2,1", "--weight", "1", "--centre", "1/2,1/3,1/5", "--omega", "1/10,2/5,9/10"]
-    data += ["--gamma", "3/5,0,4/5", "--times"]
     folder = tmp_path / "report"
     report = Report(SCHEMA, {"name": "empty"}, {"packages": {}}, [])
     folder.mkdir()
     store.write(report, folder)
     for words in (
-        ["propagate", *data, "3e3"],
-        ["reference", *data, "3", "--digits", "60"],
+        ["propagate", *options(times="3e3")],
+        ["reference", *options(times="3", digits="60")],
         ["list"],
         ["show", folder],
     ):
@@ -232,17 +229,15 @@ def test_a_third_party_integrator_cannot_silence_it() -> None:
         with output.told_when_slow("run"), quiet():
             time.sleep(0.5)
     """
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert done.stderr == "heavytop: run: 1 s so far, going on\n"
+    assert python("-c", script).stderr == "heavytop: run: 1 s so far, going on\n"
 
 
 def test_an_integration_reports_often_enough_and_its_states_stay_the_same() -> None:
-    top, start = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5")), State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
     for integrator in ("heyoka", "multiword"):
         heard: list[Fraction] = []
         times = [Fraction(7), Fraction(2000)]
         plain, told = (
-            compute(top, start, times, DOUBLE, HEAVY_TOP, integrator=integrator, reached=each)
+            compute(TOP, START, times, DOUBLE, HEAVY_TOP, integrator=integrator, reached=each)
             for each in (None, heard.append)
         )
         assert (told.states, told.drift, told.trajectory.steps) == (plain.states, plain.drift, plain.trajectory.steps)

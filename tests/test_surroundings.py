@@ -15,16 +15,13 @@ from pathlib import Path
 
 import pytest
 
-from support.helpers import without_progress
+from support.helpers import options, without_progress
+from support.reports import drift, plan_file
 
 pytestmark = pytest.mark.slow
 
 PYTHON = [sys.executable, "-m", "heavytop"]
-DATA = [
-    "--inertia", "3,2,1", "--weight", "1", "--centre", "1/2,1/3,1/5", "--omega", "1/10,2/5,9/10",
-    "--gamma", "3/5,0,4/5", "--times", "1",
-]  # fmt: skip
-PROPAGATE = ["propagate", *DATA]
+PROPAGATE = ["propagate", *options(times="1")]
 TRAJECTORY = """# inertia: 2, 2, 1
 # weight: 1
 # centre: 0, 0, 1
@@ -32,12 +29,6 @@ TRAJECTORY = """# inertia: 2, 2, 1
 # gamma: 0, 0, 1
 t,omega1,omega2,omega3,gamma1,gamma2,gamma3
 1,0,0,1,0,0,1
-"""
-PLAN = """name = "tiny"
-[[measure]]
-kind = "drift"
-cases = ["euler"]
-runs = [{ precision = "double", horizon = "2", samples = 3 }]
 """
 
 
@@ -133,12 +124,12 @@ def test_any_name_of_a_path_is_taken(tmp_path: Path) -> None:
     folder = tmp_path / "-dash a b\nΩ é 漢 quote'\""
     folder.mkdir()
     (folder / "mine.csv").write_text(TRAJECTORY)
-    (folder / "plan.toml").write_text(PLAN)
+    plan = plan_file(folder, drift("euler"))
     out, page = folder / "out", folder / "page.html"
     for words in (
         ["score", folder / "mine.csv", "--html", page],
         ["score", folder / "mine.csv", "--json"],
-        ["run", "--plan", folder / "plan.toml", "--out", out, "--workers", "1"],
+        ["run", "--plan", plan, "--out", out, "--workers", "1"],
         ["compare", out, out, "--json"],
         ["compare", out, out, "--html", page],
         ["history", out, out, "--json"],
@@ -171,12 +162,12 @@ def test_little_memory_is_an_answer_or_exit_2() -> None:
 
 
 def test_few_file_descriptors_are_an_answer_or_exit_2(tmp_path: Path) -> None:
-    (tmp_path / "plan.toml").write_text(PLAN)
+    plan = plan_file(tmp_path, drift("euler"))
 
     def limit() -> None:
         resource.setrlimit(resource.RLIMIT_NOFILE, (12, 12))
 
-    for what in ([*PROPAGATE, "--json"], ["run", "--plan", str(tmp_path / "plan.toml"), "--out", str(tmp_path / "out"),
+    for what in ([*PROPAGATE, "--json"], ["run", "--plan", plan, "--out", str(tmp_path / "out"),
                                           "--workers", "2"]):  # fmt: skip
         assert_said(limited(what, limit), 0, 2)
 
@@ -225,8 +216,8 @@ main()
 
 
 def test_threads_jumps_of_the_clock_and_the_command_line_under_strict_and_stripped_python(tmp_path: Path) -> None:
-    (tmp_path / "plan.toml").write_text(PLAN)
-    run = ["run", "--plan", str(tmp_path / "plan.toml"), "--out", str(tmp_path / "out"), "--workers", "1"]
+    plan = plan_file(tmp_path, drift("euler"))
+    run = ["run", "--plan", plan, "--out", str(tmp_path / "out"), "--workers", "1"]
     command = [sys.executable, "-W", "error", "-OO", "-c", STRICT, *run]
     done = subprocess.run(command, capture_output=True, timeout=120, check=False)
     assert (done.returncode, without_progress(done.stderr.decode())) == (0, "")

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import heavytop as ht
+from support.helpers import START, TOP
 
-TOP = ht.HeavyTop(inertia=(3, 2, 1), weight=1, centre=("1/2", "1/3", "1/5"))
-START = ht.State(omega=("1/10", "2/5", "9/10"), gamma=("3/5", 0, "4/5"))
 TIMES = [0.3, 1.7, 4.0]
 BODY = ht.Body("2", "9.81", ("0.1", "0", "0.3"), (1, 2, "1.5", "0.1", "-0.1", "0.2"), "pivot")
 SPINNING = ht.State(omega=(1, 2, 3), attitude=ht.Attitude.axis_angle((1, 2, 3), "0.7"))

@@ -2,8 +2,6 @@
 
 import json
 import re
-import subprocess
-import sys
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -14,17 +12,13 @@ import pytest
 import heavytop as ht
 from heavytop.precision import exact
 from support import in_process
+from support.helpers import python
+from support.reports import drift, plan_file
 
 ROOT = Path(__file__).parents[2]
 TOP = ht.HeavyTop((2, 2, 1), 1, (0, 0, "1/2"))
 START = ht.State(("1/5", "-1/3", "7/4"), ("2/7", "3/7", "6/7"))
 TIMES = [1, Fraction(5, 2)]
-PLAN = """name = "tiny"
-[[measure]]
-kind = "drift"
-cases = ["lagrange", "gyrostat"]
-runs = [{ precision = "double", horizon = "5", samples = 5 }]
-"""
 
 
 @pytest.mark.slow
@@ -37,7 +31,7 @@ def test_importing_loads_nothing_heavy_and_every_name_is_there() -> None:
         "try: heavytop.nonsense\n"
         "except AttributeError as error: print(error)\n"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)
+    done = python("-c", script)
     assert done.stdout == "module 'heavytop' has no attribute 'nonsense'\n"
 
 
@@ -114,8 +108,8 @@ def test_arrays_are_scored_as_the_command_line_scores_them(tmp_path: Path) -> No
     (tmp_path / "motion.json").write_text(json.dumps(document))
     row = json.loads(in_process.heavytop("score", tmp_path / "motion.json", "--json").stdout)
     assert row["digits_kept"] == score.digits_kept > 17
-    for name, drift in score.drift.items():
-        assert row["metrics"][f"drift_{name}_max"]["value"] == drift.max.value == ht.drift(run)[name].max.value
+    for name, each in score.drift.items():
+        assert row["metrics"][f"drift_{name}_max"]["value"] == each.max.value == ht.drift(run)[name].max.value
     assert row["metrics"]["solution_error_along_rms"]["value"] == score.distance["along"].rms.value
     assert row["against"] == score.against
     for states in (run.texts(), [list(map(exact, state)) for state in run.states], run.states.tolist()):
@@ -164,7 +158,7 @@ import heavytop as ht
 
 print("began", flush=True)
 found = []
-thread = threading.Thread(target=lambda: found.append(ht.run("tiny.toml", out="out", workers=2)))
+thread = threading.Thread(target=lambda: found.append(ht.run("plan.toml", out="out", workers=2)))
 thread.start()
 thread.join()
 print(found[0].verdict, ht.compare("out", found[0]).verdict)
@@ -173,10 +167,9 @@ print(found[0].verdict, ht.compare("out", found[0]).verdict)
 
 @pytest.mark.slow
 def test_a_plain_script_needs_no_main_guard(tmp_path: Path) -> None:
-    (tmp_path / "tiny.toml").write_text(PLAN)
+    plan_file(tmp_path, drift("lagrange", "gyrostat", runs=[("double", "5", 5)]))
     (tmp_path / "script.py").write_text(SCRIPT)
-    command = [sys.executable, "script.py"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+    done = python("script.py", cwd=tmp_path)
     assert (done.stdout, done.stderr) == ("began\ncomplete same\n", "")
 
 
@@ -193,20 +186,14 @@ def test_children_of_others_still_know_the_script(tmp_path: Path) -> None:
         "        child.start()\n"
         "        child.join()\n"
     )
-    done = subprocess.run(
-        [sys.executable, "script.py"], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False
-    )
+    done = python("script.py", cwd=tmp_path)
     assert (done.stdout, done.stderr) == ("\n__mp_main__\n", "")
 
 
 @pytest.mark.slow
 def test_a_finished_run_is_read_again_and_a_plan_of_odd_moments_warns(tmp_path: Path) -> None:
-    plan = tmp_path / "odd.toml"
-    plan.write_text(
-        'name = "odd"\n[[top]]\nname = "flat"\ninertia = ["3", "2", "7"]\nweight = "1"\ncentre = ["0", "0", "1"]\n'
-        'omega = ["0", "0", "1"]\ngamma = ["0", "0", "1"]\n'
-        '[[measure]]\nkind = "drift"\ncases = ["flat"]\nruns = [{ precision = "double", horizon = "1", samples = 2 }]\n'
-    )
+    top = '[[top]]\nname = "flat"\ninertia = [3, 2, 7]\nweight = 1\ncentre = [0, 0, 1]\nomega = [0, 0, 1]\n'
+    plan = plan_file(tmp_path, f"{top}gamma = [0, 0, 1]\n{drift('flat')}")
     warned = "top flat: I3 = 7 exceeds the sum 5"
     with pytest.warns(UserWarning, match=warned):
         report = ht.run(plan, out=tmp_path / "out", workers=1)

@@ -16,11 +16,10 @@ import pytest
 
 import heavytop as ht
 from support import audits
+from support.helpers import START, TOP
 
-TOP = ht.HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
 REST = ht.HeavyTop((2, 2, 2), 0, (0, 0, 0))
 STILL = ht.State((0, 0, 0), ("3/5", 0, "4/5"))
-START = ht.State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
 
 
 class Hostile:
@@ -217,14 +216,11 @@ def test_one_odd_component_is_answered_or_refused_in_words() -> None:
         (lambda: ht.real(53.0), "53.0 is not an integer"),
         (lambda: ht.real(True), "True is not an integer"),
         (lambda: ht.real(10**5000), "is not a format"),
-        (lambda: ht.propagate(TOP, START, [1], "single"), "Unknown precision 'single'"),
         (lambda: ht.propagate(TOP, START, [1], ht.Precision("double", 99)), "Unknown precision"),
-        (lambda: ht.propagate(TOP, START, ["x"]), "times: 'x' is not a finite number"),
         (lambda: ht.propagate(TOP, START, [1], tolerance="x"), "tolerance: 'x'"),
         (lambda: ht.power(TOP, START, until="x", tolerance="1e-3"), "until: 'x'"),
         (lambda: ht.score([1], [[0] * 6], top=TOP, start=START, require="x"), "require: 'x'"),
         (lambda: ht.reference(TOP, START, [1], 10, effort="x"), "effort: 'x'"),
-        (lambda: ht.propagate(TOP, START, [1], tolerance=0), "to 1; got 0"),
         (lambda: ht.propagate(TOP, START, [1], tolerance=-1), "to 1; got -1"),
         (lambda: ht.propagate(TOP, START, [1], tolerance=1e-17), "The tolerance in double must be from its eps"),
         (lambda: ht.propagate(TOP, START, [1], tolerance=math.nan), "nan is not a finite number"),
@@ -234,10 +230,7 @@ def test_one_odd_component_is_answered_or_refused_in_words() -> None:
         (lambda: ht.propagate(TOP, START, [1], xi=(1, 0, 0)), "xi·gamma = 0.6"),
         (lambda: ht.propagate(TOP, START, [1], step_limit=-1), "step_limit = -1"),
         (lambda: ht.propagate(TOP, START, [1], observer=3), "observer = 3 cannot be called"),
-        (lambda: ht.propagate(TOP, START, [1], integrator="rk4"), "Unknown integrator 'rk4'"),
         (lambda: ht.propagate(TOP, START, [1], integrator="splitting:4", step_limit=3), "has no step_limit"),
-        (lambda: ht.propagate(TOP, START, [1], system="pendulum"), "Unknown system 'pendulum'"),
-        (lambda: ht.propagate(TOP, ht.State((0, 0, 1), (1, 1, 0)), [1]), "gamma is not a unit vector"),
         (lambda: ht.propagate(TOP, (0, 0, 1), [1]), "start = (0, 0, 1) is not a State"),
         (lambda: ht.propagate(TOP, START, "123"), "times = '123' is not a list"),
         (lambda: ht.ensemble([TOP] * 2, [START] * 3, [1]), "2 tops and 3 starts"),

@@ -31,6 +31,7 @@ DATA = {
     "centre": "1/2,1/3,1/5",
     "omega": "1/10,2/5,9/10",
     "gamma": "3/5,0,4/5",
+    "times": "8",
 }
 """The same motion in the words of the command line."""
 VECTORS = json.loads((Path(__file__).parents[1] / "data" / "vectors.json").read_text("utf-8"))
