@@ -6,6 +6,7 @@ import re
 import resource
 import shutil
 import subprocess
+from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from heavytop.errors import InputError
 from heavytop.features.score.measurement import assess
 from heavytop.features.score.trajectories.files import read
 from support import in_process
+from support.helpers import options
 
 SHOWN = "quaternion,matrix,euler:ZXZ,position,omega-space"
 KEYS = {"quaternion": (4,), "matrix": (3, 3), "euler": (3,), "position": (3,), "omega_space": (3,)}
@@ -36,17 +38,15 @@ def _eighty_columns(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "80")
 
 
-def heavytop(command: str, *more: str, **changes: str) -> str:
-    options = [part for name, value in (DATA | changes).items() for part in (f"--{name}", value)]
-    done = in_process.heavytop(command, *options, *more)
+def heavytop(command: str, *more: str, data: Mapping[str, str] = DATA, **changes: str) -> str:
+    done = in_process.heavytop(command, *options(data, **changes), *more)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
 
-def refused(command: str, *more: str) -> InputError:
-    options = [part for name, value in DATA.items() for part in (f"--{name}", value)]
+def refused(command: str, *more: str, data: Mapping[str, str] = DATA) -> InputError:
     with pytest.raises(InputError) as error:
-        CliRunner().invoke(app, [command, *options, *more], catch_exceptions=False)
+        CliRunner().invoke(app, [command, *options(data), *more], catch_exceptions=False)
     return error.value
 
 
@@ -166,12 +166,12 @@ def test_bibtex_cites_program_command_and_source_and_no_path(tmp_path: Path, gam
     assert "numbers" not in text
 
 
-def test_latex_needs_no_file() -> None:
-    assert with_file_of_latex(["reference", "--latex", "--digits", "9"]) == [
-        "reference", "--latex", "-", "--digits", "9",
-    ]  # fmt: skip
-    assert with_file_of_latex(["reference", "--latex"]) == ["reference", "--latex", "-"]
-    assert with_file_of_latex(["reference", "--latex", "x.tex"]) == ["reference", "--latex", "x.tex"]
+@pytest.mark.parametrize(
+    ("given", "taken"),
+    [("--latex --digits 9", "--latex - --digits 9"), ("--latex", "--latex -"), ("--latex x.tex", "--latex x.tex")],
+)
+def test_latex_needs_no_file(given: str, taken: str) -> None:
+    assert with_file_of_latex(["reference", *given.split()]) == ["reference", *taken.split()]
 
 
 @pytest.mark.slow
@@ -242,8 +242,7 @@ def test_a_full_disk_leaves_the_file_of_before_and_no_part_of_another(
 
 @pytest.mark.slow
 def test_the_command_itself_prints_latex_and_names_itself(tmp_path: Path) -> None:
-    options = [part for name, value in DATA.items() for part in (f"--{name}", value)]
-    done = in_process.heavytop("reference", *options, "--csv", "a.csv", "--latex", cwd=tmp_path)
+    done = in_process.heavytop("reference", *options(DATA), "--csv", "a.csv", "--latex", cwd=tmp_path)
     assert done.stdout.startswith("% command: heavytop reference --inertia 2,2,1 ")
     assert "# command: heavytop reference --inertia 2,2,1 " in (tmp_path / "a.csv").read_text()
     assert done.stderr.endswith("heavytop: wrote a.csv\n")
@@ -261,26 +260,16 @@ def test_files_of_a_case_name_it(command: str, tmp_path: Path) -> None:
     assert read(files[0]).name == "kovalevskaya"
 
 
-def _from(command: str, *attitude: str) -> dict:
-    options = [part for name, value in DATA.items() if name != "gamma" for part in (f"--{name}", value)]
-    done = in_process.heavytop(command, *options, *attitude, "--show", "matrix", "--json")
-    assert done.returncode == 0, done.stdout + done.stderr
-    return json.loads(done.stdout)
-
-
 @pytest.mark.parametrize("command", ["propagate", "reference"])
 def test_axis_and_angle_are_an_attitude_of_both_commands(command: str) -> None:
     """Of an axis of any length, in radians and in degrees."""
-    turned = _from(command, "--axis-angle", "0,0,3:1/20")
-    beside = _from(command, "--euler", "ZXZ:1/20,0,0")
-    assert (turned["states"], turned["matrix"]) == (beside["states"], beside["matrix"])
-    right = _from(command, "--axis-angle", "0,1,0:90deg")
-    assert right["states"] == _from(command, "--matrix", "0,0,1,0,1,0,-1,0,0")["states"]
-    assert "not an axis and an angle" in refused_without_gamma(command, "--axis-angle", "0,0,3")
+    without = {name: value for name, value in DATA.items() if name != "gamma"}
 
+    def turned(*attitude: str) -> dict:
+        return json.loads(heavytop(command, *attitude, "--show", "matrix", "--json", data=without))
 
-def refused_without_gamma(command: str, *more: str) -> str:
-    options = [part for name, value in DATA.items() if name != "gamma" for part in (f"--{name}", value)]
-    with pytest.raises(InputError) as error:
-        CliRunner().invoke(app, [command, *options, *more], catch_exceptions=False)
-    return str(error.value)
+    found, beside = turned("--axis-angle", "0,0,3:1/20"), turned("--euler", "ZXZ:1/20,0,0")
+    assert (found["states"], found["matrix"]) == (beside["states"], beside["matrix"])
+    right = turned("--axis-angle", "0,1,0:90deg")
+    assert right["states"] == turned("--matrix", "0,0,1,0,1,0,-1,0,0")["states"]
+    assert "not an axis and an angle" in str(refused(command, "--axis-angle", "0,0,3", data=without))
