@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 from random import Random
@@ -22,7 +23,9 @@ from heavytop.features.claims.library import entry as entries
 from heavytop.features.claims.text import audit_text
 from heavytop.features.kinds import KINDS
 from heavytop.harness.checkpoint import Saved
+from heavytop.precision import cross, exact
 from support.claim_tables import audited, top
+from support.full_tensor import integrate
 from support.in_process import heavytop
 
 TOP = top("3 2 1", "1/2 1/3 1/5")
@@ -121,50 +124,39 @@ TENSOR_BODY = {
 TURNED = {"omega": ["0.5", "-0.25", "1.5"], "euler": "ZXZ:30deg,0.4,1"}
 
 
-def integrated(time: str) -> dict[str, list[Any]]:
-    """The motion of :data:`TENSOR_BODY` by mpmath's own Taylor method, with the quaternion of the whole attitude."""
-    lib = mpmath.mp.clone()
+def integrated(time: str) -> dict[str, list[str]]:
+    """The motion of :data:`TENSOR_BODY` by Taylor series of a rotation matrix, to 22 digits."""
+    lib = mpmath.MPContext()
     lib.dps = 30
-    inertia = lib.matrix([[lib.mpf(part) for part in row] for row in TENSOR])
-    inverse, wheel = inertia**-1, [lib.mpf(part) for part in ("0.3", "-0.1", "0.7")]
-    pull = [2 * lib.mpf("9.81") * lib.mpf(part) for part in ("0.1", "-0.2", "0.3")]
 
-    def cross(a: Any, b: Any) -> list[Any]:
-        return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    def turn(angle: Any, axis: int) -> Any:
+        matrix, i, j = lib.eye(3), (axis + 1) % 3, (axis + 2) % 3
+        matrix[i, i] = matrix[j, j] = lib.cos(angle)
+        matrix[j, i], matrix[i, j] = lib.sin(angle), -lib.sin(angle)
+        return matrix
 
-    def up(q: Any) -> list[Any]:
-        w, x, y, z = q
-        return [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z]
-
-    def product(p: Any, q: Any) -> list[Any]:
-        v = [p[0] * b + q[0] * a + c for a, b, c in zip(p[1:], q[1:], cross(p[1:], q[1:]), strict=True)]
-        return [p[0] * q[0] - sum(a * b for a, b in zip(p[1:], q[1:], strict=True)), *v]
-
-    def rates(_: Any, y: Any) -> list[Any]:
-        omega, q = y[:3], y[3:]
-        momentum = [sum(inertia[i, j] * omega[j] for j in range(3)) + wheel[i] for i in range(3)]
-        torque = [a + b for a, b in zip(cross(momentum, omega), cross(up(q), pull), strict=True)]
-        spin = [sum(inverse[i, j] * torque[j] for j in range(3)) for i in range(3)]
-        return [*spin, *(part / 2 for part in product(q, [0, *omega]))]
-
-    q = [lib.mpf(1), lib.mpf(0), lib.mpf(0), lib.mpf(0)]
-    for angle, axis in ((lib.pi / 6, 3), (lib.mpf("0.4"), 1), (lib.mpf(1), 3)):
-        turn = [lib.cos(angle / 2), lib.mpf(0), lib.mpf(0), lib.mpf(0)]
-        turn[axis] = lib.sin(angle / 2)
-        q = product(q, turn)
-    began = [*(lib.mpf(part) for part in TURNED["omega"]), *q]
-    omega, q = (lambda y: (y[:3], y[3:]))(lib.odefun(rates, 0, began)(lib.mpf(time)))
-    centre = [lib.mpf(0), *(lib.mpf(part) for part in TENSOR_BODY["centre"])]
-    place = product(product(q, centre), [q[0], -q[1], -q[2], -q[3]])[1:]
-    kinetic = sum(inertia[i, j] * omega[i] * omega[j] for i in range(3) for j in range(3)) / 2
-    momentum = [sum(inertia[i, j] * omega[j] for j in range(3)) + wheel[i] for i in range(3)]
-    energy = kinetic + sum(a * b for a, b in zip(pull, up(q), strict=True))
-    area = sum(a * b for a, b in zip(momentum, up(q), strict=True))
-    found = {"omega": omega, "gamma": up(q), "quaternion": [-part for part in q], "position": place}
-    return {
-        name: [lib.nstr(part, 22, strip_zeros=False) for part in values]
-        for name, values in (found | {"energy": [energy], "area": [area]}).items()
+    begun = turn(lib.pi / 6, 2) * turn(lib.mpf("0.4"), 0) * turn(lib.mpf(1), 2)
+    axes = [[exact(begun[i, j]) for j in range(3)] for i in range(3)]
+    centre, rotor = ([Fraction(part) for part in TENSOR_BODY[key]] for key in ("centre", "rotor"))
+    pull = [2 * Fraction("9.81") * part for part in centre]
+    found = integrate(TENSOR, pull, rotor, axes, TURNED["omega"], Fraction(time))
+    omega, gamma, xi = found[:3], found[3:6], found[6:]
+    r = (xi, cross(gamma, xi), gamma)
+    w = lib.sqrt(sum((r[i][i] for i in range(3)), Fraction(1))) / 2
+    momentum = [sum(Fraction(a) * b for a, b in zip(row, omega, strict=True)) for row in TENSOR]
+    values = {
+        "omega": omega,
+        "gamma": gamma,
+        "quaternion": [w, *(lib.convert(r[i - 1][i - 2] - r[i - 2][i - 1]) / (4 * w) for i in range(3))],
+        "position": [dot(row, centre) for row in r],
+        "energy": [dot(momentum, omega) / 2 + dot(pull, gamma)],
+        "area": [dot([a + b for a, b in zip(momentum, rotor, strict=True)], gamma)],
     }
+    return {name: [lib.nstr(lib.convert(part), 22, strip_zeros=False) for part in parts] for name, parts in values.items()}
+
+
+def dot(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:
+    return sum((x * y for x, y in zip(a, b, strict=True)), Fraction(0))
 
 
 def with_another_digit(text: str) -> str:
