@@ -73,8 +73,7 @@ def body_lines(top: ht.HeavyTop, start: ht.State) -> dict[str, list[Fraction]]:
 
 @pytest.mark.parametrize("name", ["bruels-cardona-arnold", "lagrange", "generic", "euler", "t-handle", "kowalewski"])
 def test_the_body_of_a_request_has_the_moments_and_the_weight_of_the_top(name: str) -> None:
-    top = case(name).top
-    body = body_lines(top, case(name).start)
+    top, body = case(name).top, body_lines(case(name).top, case(name).start)
     central = MassProperties(tuple(body["inertia"]), body["mass"][0], tuple(body["centre"])).central
     found = Body(body["mass"][0], body["gravity"][0], body["centre"], [v for row in central for v in row], CENTRE)
     scale = max(top.inertia)

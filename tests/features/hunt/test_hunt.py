@@ -11,12 +11,13 @@ from heavytop.features.hunt.measured import FAMILIES, MOST_TURNS, Meter, drawn, 
 from heavytop.features.hunt.search import digits, keep, kept
 from heavytop.features.kinds import KINDS
 from heavytop.harness.checkpoint import Saved
-from heavytop.harness.plan import expand, load
 from heavytop.integrate.registry import INTEGRATORS, Integrator, described
 from heavytop.precision import exact
+from heavytop.top.amplification import amplification
+from heavytop.top.equations import HEAVY_TOP
 from support.in_process import heavytop
+from support.reports import tasks_of
 
-FAULTS = Path(__file__).parents[3] / "validation" / "hunts.py"
 NUMBERS = ("inertia", "centre", "omega", "gamma")
 
 
@@ -24,13 +25,17 @@ def numbers(found: dict[str, object]) -> list[Fraction]:
     return [exact(text) for key in NUMBERS for text in found[key]] + [exact(found["weight"])]  # type: ignore[attr-defined]
 
 
+def hunted(fault: str, monkeypatch: pytest.MonkeyPatch, **options: object) -> ht.Hunt:
+    """A hunt of a fault of validation/hunts.py, in this process: one of its own takes seconds to begin."""
+    planted = Integrator(f"planted:{fault}", f"hunts:{fault}")
+    monkeypatch.setitem(INTEGRATORS, planted.name, planted)
+    return ht.hunt(planted.name, **options)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", ["branch", "rest"])
 def test_a_planted_fault_is_found_and_shrunk(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    # in this process: one of its own takes seconds to begin
-    planted = Integrator(f"planted:{fault}", f"hunts:{fault}")
-    monkeypatch.setitem(INTEGRATORS, planted.name, planted)
-    hunt = ht.hunt(f"planted:{fault}", budget=128, horizon=2)
+    hunt = hunted(fault, monkeypatch, budget=128, horizon=2)
     assert hunt.found
     worst = hunt.found[0]
     assert max(map(digits, numbers(worst))) <= 3
@@ -48,9 +53,7 @@ def test_a_planted_fault_is_found_and_shrunk(fault: str, monkeypatch: pytest.Mon
 
 @pytest.mark.slow
 def test_a_fault_of_heavy_gyrostats_is_found_shrunk_and_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    planted = Integrator("planted:rotor", "hunts:rotor")
-    monkeypatch.setitem(INTEGRATORS, planted.name, planted)
-    hunt = ht.hunt("planted:rotor", budget=10, horizon=1, family="heavy_gyrostat")
+    hunt = hunted("rotor", monkeypatch, budget=10, horizon=1, family="heavy_gyrostat")
     worst = hunt.found[0]
     assert worst["system"] == "heavy_gyrostat"
     assert max(map(digits, [*numbers(worst), *map(exact, worst["rotor"])])) <= 3
@@ -85,22 +88,13 @@ def test_the_command_line_prints_the_document_and_ends_with_1_where_anything_is_
 @pytest.mark.parametrize(
     "wrong",
     [
-        ("--budget", "0"),
-        ("--budget", "nan"),
-        ("--budget", "-5s"),
-        ("--horizon", "0"),
-        ("--horizon", "inf"),
-        ("--limit", "-1"),
-        ("--seed", "-1"),
-        ("--family", "hess"),
-        ("--integrator", "nobody"),
-        ("--against", "nobody"),
-        ("--against", "heyoka"),
-        ("--precision", "double-double"),
+        *(f"--budget {budget}" for budget in ("0", "nan", "-5s")),
+        *("--horizon 0", "--horizon inf", "--limit -1", "--seed -1", "--family hess", "--integrator nobody"),
+        *("--against nobody", "--against heyoka", "--precision double-double"),
     ],
 )
-def test_what_is_no_hunt_is_refused(wrong: tuple[str, str]) -> None:
-    done = heavytop("hunt", *wrong)
+def test_what_is_no_hunt_is_refused(wrong: str) -> None:
+    done = heavytop("hunt", *wrong.split())
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
 
@@ -118,9 +112,6 @@ def test_draws_are_bodies_of_their_family_and_depend_on_seed_and_index_alone() -
 
 @pytest.mark.slow
 def test_error_and_amplification_are_those_of_the_scorer_and_the_variational_equation() -> None:
-    from heavytop.top.amplification import amplification
-    from heavytop.top.equations import HEAVY_TOP
-
     meter = Meter(described("heyoka"), ht.DOUBLE, Fraction(10), None)
     motions = [drawn(1, index, "any", Fraction(10)) for index in (0, 2, 4)]
     for found in meter.measure(motions):
@@ -137,17 +128,8 @@ def test_error_and_amplification_are_those_of_the_scorer_and_the_variational_equ
 @pytest.mark.slow
 def test_what_a_plan_finds_is_kept_and_measured_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    plan = """name = "hunted"
-[[measure]]
-kind = "hunt"
-horizon = "1"
-budget = 2
-family = "euler"
-limit = "1e-9"
-found = "found.toml"
-"""
-    Path("plan.toml").write_text(plan)
-    (task,) = expand(load("plan.toml", KINDS)[0])
+    table = 'kind = "hunt"\nhorizon = "1"\nbudget = 2\nfamily = "euler"\nlimit = "1e-9"\nfound = "found.toml"'
+    (task,) = tasks_of(tmp_path, f"[[measure]]\n{table}\n")
     row = KINDS["hunt"].measure(task, Saved())
     assert row.outcome == "failed"
     assert "heavytop propagate" in row.against
@@ -171,5 +153,4 @@ def test_what_is_rounded_on_the_way_may_grow_by_more_than_what_is_rounded_at_the
 @pytest.mark.slow
 def test_the_same_seed_searches_the_same() -> None:
     one, two = (ht.hunt(budget=24, horizon=2, seed=9).hunted.worst for _ in range(2))
-    assert [m.motion for m in one] == [m.motion for m in two]
-    assert [m.error for m in one] == [m.error for m in two]
+    assert [(m.motion, m.error) for m in one] == [(m.motion, m.error) for m in two]

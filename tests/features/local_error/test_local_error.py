@@ -26,17 +26,23 @@ def examined(run, steps):
     return error.metrics()
 
 
-def stepped(*given, by=first_steps, **options):
-    """A run and its (time, step) pairs."""
-    run, steps = by(*given, **options)
+def stepped(name, until, precision=DOUBLE, by=first_steps, **options):
+    """A run of a case and its (time, step) pairs."""
+    case = CASES[name]
+    run, steps = by(case.top, case.start, until, precision, system=case.system, **options)
     return run, list(zip(run.times, steps, strict=True))
+
+
+def called(integrator, name, until, precision=DOUBLE):
+    """A run of a case by an integrator of that name, and its single calls."""
+    case = CASES[name]
+    return single_calls(described(integrator), case.top, case.start, Fraction(until), precision, case.system)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "precision"), [("kovalevskaya", DOUBLE), ("gyrostat", EXTENDED), ("euler", QUAD)])
 def test_a_step_is_right_to_an_ulp_and_of_the_order_that_heyoka_says(name, precision) -> None:
-    case = CASES[name]
-    run, steps = stepped(case.top, case.start, 2, precision, system=case.system)
+    run, steps = stepped(name, 2, precision)
     found = examined(run, steps)
     assert run.outcome is Outcome.SUCCESS
     assert 0 < float(found["local_error_ulp_rms"].value) <= float(found["local_error_ulp_max"].value) < 2
@@ -46,36 +52,31 @@ def test_a_step_is_right_to_an_ulp_and_of_the_order_that_heyoka_says(name, preci
 @pytest.mark.slow
 @pytest.mark.parametrize(("digits", "order"), [(6, 8), (12, 15)])
 def test_the_order_is_that_of_the_tolerance(digits, order) -> None:
-    case = CASES["lagrange"]
-    run, steps = stepped(case.top, case.start, 2, DOUBLE, tolerance=Fraction(1, 10**digits))
+    run, steps = stepped("lagrange", 2, tolerance=Fraction(1, 10**digits))
     assert run.order == order
     assert examined(run, steps)["observed_order"].value == str(order)
 
 
 def test_a_step_that_is_off_by_ten_ulps_is_seen_as_that() -> None:
-    case = CASES["kovalevskaya"]
-    run, steps = first_steps(case.top, case.start, Fraction(1, 100), DOUBLE)
-    (step,) = steps
+    run, ((time, step),) = stepped("kovalevskaya", Fraction(1, 100))
     off = step.end.copy()
     off[4] += 10 * numpy.finfo(float).eps * abs(step.start).max()
     good, bad = (
-        float(examined(run, [(run.times[0], replace(step, end=end))])["local_error_ulp_max"].value)
-        for end in (step.end, off)
+        float(examined(run, [(time, replace(step, end=end))])["local_error_ulp_max"].value) for end in (step.end, off)
     )
     assert 10 - good <= bad <= 10 + good
 
 
 @pytest.mark.slow
 def test_one_order_less_shows_in_the_order_alone() -> None:
-    case = CASES["generic"]
     asked = (first_steps, FAULTS["order"].first_steps)
-    healthy, broken = (examined(*stepped(case.top, case.start, 4, DOUBLE, by=steps)) for steps in asked)
+    healthy, broken = (examined(*stepped("generic", 4, by=steps)) for steps in asked)
     assert (healthy["observed_order"].value, broken["observed_order"].value) == ("20", "19")
 
 
 def test_steps_are_those_of_a_run() -> None:
-    case = CASES["euler"]
-    run, steps = first_steps(case.top, case.start, 2, DOUBLE)
+    run, pairs = stepped("euler", 2)
+    steps = [step for _, step in pairs]
     assert float(run.times[-2]) < 2 <= float(run.times[-1])
     lengths = [exact(step.length) for step in steps]
     assert [float(time) for time in run.times] == pytest.approx([float(time) for time in accumulate(lengths)])
@@ -93,8 +94,7 @@ def test_an_equilibrium_has_no_steps() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "order"), [("splitting:2", 2), ("splitting:8", 8)])
 def test_a_method_with_fixed_steps_shows_its_order_in_longer_ones(name, order) -> None:
-    case = CASES["generic"]
-    run, calls = single_calls(described(name), case.top, case.start, Fraction(4), DOUBLE, case.system)
+    run, calls = called(name, "generic", 4)
     found = examined(run, calls)
     assert found["observed_order"].value == str(order)
     assert all(call.length == Fraction(1 / 100) for _, call in calls)
@@ -103,8 +103,7 @@ def test_a_method_with_fixed_steps_shows_its_order_in_longer_ones(name, order) -
 
 @pytest.mark.slow
 def test_an_error_of_a_call_is_that_of_one_step_from_where_it_starts() -> None:
-    case = CASES["euler"]
-    run, calls = single_calls(described("splitting:2"), case.top, case.start, Fraction(1), DOUBLE, case.system)
+    run, calls = called("splitting:2", "euler", 1)
     size, worst = Fraction(0), Fraction(0)
     for _, call in calls:
         begin = State(*(tuple(map(exact, call.start[i : i + 3])) for i in (0, 3)))
@@ -117,8 +116,7 @@ def test_an_error_of_a_call_is_that_of_one_step_from_where_it_starts() -> None:
 
 @pytest.mark.slow
 def test_an_integrator_with_a_tolerance_is_called_over_its_mean_step_and_shows_no_order() -> None:
-    case = CASES["lagrange"]
-    run, calls = single_calls(described("multiword"), case.top, case.start, Fraction(4), EXTENDED, case.system)
+    run, calls = called("multiword", "lagrange", 4, EXTENDED)
     found = examined(run, calls)
     assert float(calls[0][1].length) == pytest.approx(4 / run.steps)
     assert found.keys() == {"local_error_ulp_max", "local_error_ulp_rms"}
@@ -131,9 +129,7 @@ def test_a_count_of_steps_makes_no_step_of_a_given_length_shorter_and_none_at_al
     name, times, monkeypatch
 ) -> None:
     propagate = Integrator.propagate
-    case = CASES["lagrange"]
-    asked = described(name), case.top, case.start, Fraction(1), DOUBLE, case.system
-    _, honest = single_calls(*asked)
+    _, honest = called(name, "lagrange", 1)
 
     def miscounted(self, *given, **options):
         run = propagate(self, *given, **options)
@@ -142,9 +138,9 @@ def test_a_count_of_steps_makes_no_step_of_a_given_length_shorter_and_none_at_al
     monkeypatch.setattr(Integrator, "propagate", miscounted)
     if not times:
         with pytest.raises(PeerFailed, match=f"{name} moved, and says that it took no step"):
-            single_calls(*asked)
+            called(name, "lagrange", 1)
         return
-    _, calls = single_calls(*asked)
+    _, calls = called(name, "lagrange", 1)
     assert [(call.length, *call.end) for _, call in calls] == [(call.length, *call.end) for _, call in honest]
 
 
