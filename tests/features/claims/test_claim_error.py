@@ -22,11 +22,8 @@ SIX = PartialCase(Fraction(1), Fraction(6), Fraction(1))
 @pytest.mark.parametrize(
     ("case", "time", "expected"),
     [
-        (TWO, "0.1", "0.0024912"),
-        (TWO, "1", "0.173905"),
-        (TWO, "2", "0.220605"),
-        (SIX, "0.1", "0.181054"),
-        (SIX, "1", "2.920776"),
+        *((TWO, *pair) for pair in (("0.1", "0.0024912"), ("1", "0.173905"), ("2", "0.220605"))),
+        *((SIX, *pair) for pair in (("0.1", "0.181054"), ("1", "2.920776"))),
     ],
 )
 @pytest.mark.parametrize("sign", [1, -1])

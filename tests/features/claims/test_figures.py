@@ -67,11 +67,8 @@ def test_the_files_of_the_command_are_complete_and_the_same_every_time(tmp_path,
         one = tmp_path / "one" / two.name
         assert one.read_bytes() == two.read_bytes()
         if one.name == "truth-ratio2.svg":
-            for said in (
-                "as printed: Ω off by 1 % of α at t = 0.0100",
-                "smooth branch: Ω off by 1 % of α at t = 0.2014",
-            ):
-                assert said in one.read_text("utf-8")
+            for branch, time in (("as printed", "0.0100"), ("smooth branch", "0.2014")):
+                assert f"{branch}: Ω off by 1 % of α at t = {time}" in one.read_text("utf-8")
         if one.suffix == ".svg":
             assert ElementTree.parse(one).getroot().tag.endswith("svg")
         else:

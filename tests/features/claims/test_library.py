@@ -53,9 +53,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A library of two entries, one refuted, and an empty cache."""
     library = tmp_path / "library"
     library.mkdir()
-    monkeypatch.setattr(entries, "FOLDER", library)
-    monkeypatch.setattr(auditing, "FOLDER", library)
-    monkeypatch.setattr(claim_library, "FOLDER", library)
+    for module in (entries, auditing, claim_library):
+        monkeypatch.setattr(module, "FOLDER", library)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     put(library, HEAD | CLAIM | {"corrects": MISPRINT["id"], "aliases": ["Lagrange's spin"]})
     put(library, HEAD | CLAIM | MISPRINT | {"integral": {"value": "Omega1"}})
@@ -74,9 +73,8 @@ def test_the_list_has_every_key_and_says_the_verdict(folder: Path) -> None:
     found = json.loads(in_process.heavytop("claims", "--json").stdout)["claims"]
     assert {each["id"]: each["verdict"] for each in found} == {HEAD["id"]: "holds", MISPRINT["id"]: "refuted"}
     for each in found:
-        assert set(each) == {
-            "id", "title", "year", "source", "status", "read", "tags", "verdict", "expects", "seconds",
-        }  # fmt: skip
+        keys = "id title year source status read tags verdict expects seconds"
+        assert set(each) == {*keys.split()}
         assert each["verdict"] == each["expects"]
         assert each["source"] == "J.-L. Lagrange (1788), Mécanique analytique"
         assert each["seconds"] > 0
@@ -199,10 +197,7 @@ def test_the_document_for_others_fits_its_schema_and_is_the_audit(folder: Path, 
 @pytest.mark.slow
 def test_the_plan_measures_every_entry_and_an_unexpected_verdict_is_worse(folder: Path, tmp_path: Path) -> None:
     before = ht.run("claims", out=tmp_path / "before", workers=1)
-    assert [(row.case, row.metrics["as_expected"].value) for row in before.rows] == [
-        (HEAD["id"], "1"),
-        (MISPRINT["id"], "1"),
-    ]
+    assert {row.case: row.metrics["as_expected"].value for row in before.rows} == {HEAD["id"]: "1", MISPRINT["id"]: "1"}
     put(folder, HEAD | CLAIM | {"integral": {"value": "Omega3 + Omega1"}})
     after = ht.run("claims", out=tmp_path / "after", workers=1)
     assert ht.compare(before, after).verdict == "worse"

@@ -152,7 +152,9 @@ def integrated(time: str) -> dict[str, list[str]]:
         "energy": [dot(momentum, omega) / 2 + dot(pull, gamma)],
         "area": [dot([a + b for a, b in zip(momentum, rotor, strict=True)], gamma)],
     }
-    return {name: [lib.nstr(lib.convert(part), 22, strip_zeros=False) for part in parts] for name, parts in values.items()}
+    return {
+        name: [lib.nstr(lib.convert(part), 22, strip_zeros=False) for part in parts] for name, parts in values.items()
+    }
 
 
 def dot(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:
