@@ -5,15 +5,13 @@ from fractions import Fraction
 import pytest
 from flint import arb
 
-from heavytop.errors import OutOfReach
 from heavytop.exact.cases.delone import DeloneHomoclinic
 from heavytop.exact.flint.balls import ball, midpoint, radius, working_precision
 from heavytop.features.claims.claim_error import CLAIM_XI, claim_attitude, exact_claim, model_error
 from heavytop.features.claims.kinds.claim_model import true_motion
 from heavytop.features.claims.library.ershkov import PartialCase
 from heavytop.integrate.trajectory import Problem
-from heavytop.measure.truth import ComputedReference, compute
-from support.helpers import VECTORS
+from heavytop.measure.truth import compute
 
 TWO = PartialCase(Fraction(1), Fraction(2), Fraction(1))
 SIX = PartialCase(Fraction(1), Fraction(6), Fraction(1))
@@ -43,37 +41,18 @@ def test_the_error_in_gamma_starts_like_half_k_t() -> None:
         assert float(error.omega) < 10 * float(case.solves.rate) ** 2 / 10**6
 
 
-def computed(motion, times: list[Fraction], **more) -> ComputedReference:
-    (found,) = compute([lambda precision: Problem.of(motion.top, motion.start, precision, **more)], times, 256)
-    return found
-
-
-@pytest.mark.slow
-def test_the_truth_for_six_is_the_motion_of_the_vectors() -> None:
-    given = next(v for v in VECTORS if v["name"].startswith("paper data"))
-    known = computed(SIX.solves, [Fraction(1)])
-    for value, text in zip(known.state(Fraction(1)), given["state"], strict=True):
-        assert abs(midpoint(value) - Fraction(text)) < Fraction(1, 10**58)
-    assert "computed, not proven" in known.against.text
-
-
 @pytest.mark.slow
 def test_the_computed_truth_and_the_closed_form_agree_where_there_are_both() -> None:
     times = [Fraction(1, 2), Fraction(3)]
     delone = DeloneHomoclinic(TWO.alpha, TWO.i1)
-    reference = computed(delone, times, xi=CLAIM_XI)
+    given = [lambda precision: Problem.of(delone.top, delone.start, precision, xi=CLAIM_XI)]
+    (reference,) = compute(given, times, 256)
     truth, against = true_motion(TWO, times)
     assert against.how == "proven"
     for time in times:
         with working_precision(200):
             for a, b in zip(truth(time), reference.state(time), strict=True):
                 assert abs(a - b) < ball(Fraction(1, 10**40))
-
-
-def test_a_computed_reference_that_does_not_arrive_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("heavytop.measure.truth.EFFORT", 1e-4)
-    with pytest.raises(OutOfReach, match="stopped at the step limit"):
-        computed(SIX.solves, [Fraction(10)])
 
 
 def test_claim_and_truth_start_from_the_same_attitude() -> None:
