@@ -11,11 +11,13 @@ import numpy as np
 import pytest
 
 import heavytop as ht
+from heavytop.cases import CASES
 from heavytop.features.limits.power import FAULTS
 from support.helpers import START, TOP
 from support.in_process import heavytop
 
 FLIP = ht.HeavyTop(("919/15000", "967/15000", "83/15000"), 0, (0, 0, 0)), ht.State((10, 0, "1e-10"), (0, 0, 1))
+LAGRANGE = CASES["lagrange"].top, CASES["lagrange"].start
 BODY = ht.Body("2", "9.81", ("0.1", "0", "0.3"), (1, 2, "1.5", "0.1", "-0.1", "0.2"), "pivot")
 SPINNING = ht.State(omega=(1, 2, 3), attitude=ht.Attitude.quaternion(1, 0, 0, 0))
 
@@ -37,8 +39,7 @@ def test_digits_of_a_flip_end_where_those_of_runs_do() -> None:
 
 @pytest.mark.slow
 def test_digits_of_a_regular_motion_stay_and_an_equilibrium_loses_none() -> None:
-    lagrange = ht.HeavyTop(("5/2", "5/2", "3/2"), 2, (0, 0, "3/4"))
-    ends = ht.digits_end(lagrange, ht.State(("1/5", "-1/3", "7/4"), ("2/7", "3/7", "6/7")), 5, "extended")
+    ends = ht.digits_end(*LAGRANGE, 5, "extended")
     assert ends.first is ends.last is None
     assert ends.digits[-1] > 18
     rest = ht.digits_end(ht.HeavyTop((3, 2, 1), 1, (0, 0, 1)), ht.State((0, 0, 0), (0, 0, 1)), 5)
@@ -114,17 +115,13 @@ def test_what_changes_nothing_is_not_planted_and_what_is_unknown_is_refused() ->
 
 def test_the_command_line_says_the_same(tmp_path: Path) -> None:
     done = heavytop("power", "--case", "lagrange", "--until", "1", "--tolerance", "1e-3", "--step", "1/4", "--json")
-    case = ht.power(
-        ht.HeavyTop(("5/2", "5/2", "3/2"), 2, (0, 0, "3/4")),
-        ht.State(("1/5", "-1/3", "7/4"), ("2/7", "3/7", "6/7")), 1, "1e-3", "1/4",
-    )  # fmt: skip
+    case = ht.power(*LAGRANGE, 1, "1e-3", "1/4")
     assert json.loads(done.stdout) == json.loads(json.dumps(case.to_json()))
     assert done.returncode == 1
-    known = heavytop(
-        "propagate", "--case", "lagrange", "--times", "1", "--between", "1/10", "--within", "1e-3", "--json"
-    )
+    asked = ("propagate", "--case", "lagrange", "--times", "1")
+    known = heavytop(*asked, "--between", "1/10", "--within", "1e-3", "--json")
     assert set(json.loads(known.stdout)["between"]["errors"]) == {"slerp", "linear", "hermite", "lagrange"}
-    assert heavytop("propagate", "--case", "lagrange", "--times", "1", "--within", "1").returncode == 2
+    assert heavytop(*asked, "--within", "1").returncode == 2
     assert heavytop("power", "--until", "1", "--tolerance", "1").returncode == 2
 
 

@@ -15,7 +15,7 @@ from heavytop.exact.flint.balls import ball, working_precision
 from heavytop.features.score.trajectories.columns import header
 from heavytop.features.score.trajectories.files import read, read_table, require_body, require_case, unread
 from heavytop.integrate.heyoka.motions import propagate
-from heavytop.precision import DOUBLE, EXTENDED, QUAD, decimal_text
+from heavytop.precision import DOUBLE, EXTENDED, QUAD, decimal_text, round_to
 from heavytop.top.bodies import Body
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
@@ -53,9 +53,7 @@ def scored(tmp_path: Path, text: str | bytes, name: str = "a.csv", case=CASE):
         table("t\tp\tq\tr\tγ₁\tγ₂\tγ₃", "\t"),
         table('"t" "\\Omega_{1}" "\\Omega_{2}" "\\Omega_{3}" "\\gamma_{1}" "\\gamma_{2}" "\\gamma_{3}"', " "),
         table("# t omega0 omega1 omega2 gamma0 gamma1 gamma2", "   ", "%.18e"),
-        table(
-            "% made by another program\nt gamma1 gamma2 gamma3 omega1 omega2 omega3", " ", order=(0, 4, 5, 6, 1, 2, 3)
-        ),
+        table("% by another program\nt gamma1 gamma2 gamma3 omega1 omega2 omega3", " ", order=(0, 4, 5, 6, 1, 2, 3)),
         table(HEADER, ", ", "%.17E").replace("E", "D"),
         table(HEADER + ",energy", order=(*range(7), 1)),
         table("// t, omega (rad/s)\n" + HEADER) + "\n\n",
@@ -254,8 +252,6 @@ def test_what_other_programs_write_for_no_number_is_none(text: str) -> None:
 @pytest.mark.parametrize("form", [DOUBLE, EXTENDED, QUAD], ids=lambda form: form.name)
 @pytest.mark.parametrize("more", [0, 2, 9])
 def test_digits_beyond_those_of_a_format_do_not_make_it_wider(form, more: int) -> None:
-    from heavytop.precision import round_to
-
     values = [round_to(Fraction(k, 7), form.bits) for k in range(1, 40)]
     assert format_of(decimal_text(value, form.digits + more) for value in values) == form
 
