@@ -40,22 +40,20 @@ def test_on_the_separatrix_and_beside_it_every_digit_comes_out(off, signs):
     assert_every_digit(motion, Fraction(7, 3), Fraction(-40), Fraction(250))
 
 
-def test_beside_the_saddle_every_digit_comes_out():
-    for omega in ((TINY, 1, 0), (0, 1, TINY), (TINY, 1, 3 * TINY), (TINY, 1, -TINY)):
-        motion = euler(SEPARATRIX_INERTIA, omega)
-        assert_solves(motion, Fraction(1), Fraction(100), Fraction(10**6))
-
-
-def test_beside_a_steady_rotation_and_beside_symmetry_every_digit_comes_out():
-    for inertia, omega in (
+@pytest.mark.parametrize(
+    ("inertia", "omega"),
+    [
+        *((SEPARATRIX_INERTIA, omega) for omega in ((TINY, 1, 0), (0, 1, TINY), (TINY, 1, 3 * TINY), (TINY, 1, -TINY))),
         ((3, 2, 1), (1, TINY, 0)),
         ((3, 2, 1), (TINY, 0, 1)),
         ((2 + TINY, 2, 1), (1, 1, 1)),
         ((2, 1, 1 - TINY), (1, 1, 1)),
         ((2 + TINY, 2, 2 - TINY), (1, 2, 1)),
         ((2 + TINY, 2, 2), (1, 2, 1)),
-    ):
-        assert_solves(euler(inertia, omega), Fraction(3), Fraction(10**6))
+    ],
+)
+def test_beside_a_saddle_a_steady_rotation_and_symmetry_every_digit_comes_out(inertia, omega):
+    assert_solves(euler(inertia, omega), Fraction(3), Fraction(100), Fraction(10**6))
 
 
 def test_a_body_at_rest_stays_at_rest():

@@ -17,6 +17,7 @@ from heavytop.integrate.heyoka import lanes
 from heavytop.integrate.heyoka.lanes import Lanes
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.multiword.lanes import propagate_multiword_ensemble
+from heavytop.integrate.multiword.motions import propagate_multiword
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, real
 from heavytop.top.attitude import perpendicular
@@ -226,11 +227,21 @@ def test_the_motion_is_the_true_one_to_rounding(name: str) -> None:
 def test_formats_without_lanes_have_the_bits_of_the_scalar_integrator(precision) -> None:
     given = problems(3, precision)
     given[1] = Problem.of(*SLEEPING, precision)
-    times = [-1, -2]
-    runs = propagate_ensemble(given, times, threads=2)
-    tops = [(TOP, start(0)), SLEEPING, (TOP, start(2))]
-    assert all(same(run, propagate(*top, times, precision)) for run, top in zip(runs, tops, strict=True))
+    runs = propagate_ensemble(given, [-1, -2], threads=2)
+    assert all(same(run, as_scalar(propagate, problem, [-1, -2])) for run, problem in zip(runs, given, strict=True))
     assert {run.integrator for run in runs} == {"heyoka"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("precision", "xi"), [(QUAD, None), (DOUBLE, perpendicular(start(0).gamma))])
+def test_words_without_lanes_have_the_bits_of_a_run_by_itself(precision, xi) -> None:
+    given = problems(3, precision, xi=xi)
+    for run, problem in zip(propagate_multiword_ensemble(given, TIMES, threads=2), given, strict=True):
+        assert same(run, as_scalar(propagate_multiword, problem, TIMES))
+
+
+def as_scalar(integrate, problem: Problem, times):
+    return integrate(problem.top, problem.start, times, problem.precision, xi=problem.xi)
 
 
 @pytest.mark.slow
@@ -268,11 +279,15 @@ def test_an_error_of_the_observer_ends_the_ensemble(threads: int) -> None:
     def observer(index: int, time: Fraction, state) -> None:
         raise LookupError(index)
 
-    for precision in (DOUBLE, EXTENDED):
-        full = propagate_ensemble(problems(3, precision), [1, 2], threads=threads)
+    for ensemble, precision in (
+        (propagate_ensemble, DOUBLE),
+        (propagate_ensemble, EXTENDED),
+        (propagate_multiword_ensemble, DOUBLE),
+    ):
+        full = ensemble(problems(3, precision), [1, 2], threads=threads)
         with pytest.raises(LookupError):
-            propagate_ensemble(problems(30, precision), [1, 10**9], observer=observer, threads=threads)
-        assert all(map(same, propagate_ensemble(problems(3, precision), [1, 2], threads=threads), full))
+            ensemble(problems(30, precision), [1, 10**9], observer=observer, threads=threads)
+        assert all(map(same, ensemble(problems(3, precision), [1, 2], threads=threads), full))
 
 
 @pytest.mark.slow

@@ -95,20 +95,17 @@ def test_the_tolerance_in_force_is_the_one_recorded(monkeypatch: pytest.MonkeyPa
     assert texts == ["relative 2.22e-14, absolute 1e-15", ""]
 
 
-def test_what_a_peer_cannot_do_is_refused() -> None:
-    case = CASES["euler"]
-    both = case.top, case.start
-    for call, message in (
-        (lambda: run_peer("scipy:DOP853", *both, TIMES, QUAD), "scipy:DOP853 has no quad"),
-        (lambda: odefun(*both, [Fraction(-1)], QUAD), "forwards only"),
-        (lambda: run_peer("rk4", *both, TIMES, DOUBLE), "Unknown integrator 'rk4'"),
-        (lambda: run_peer("heyoka", *both, TIMES, DOUBLE, setting=("step", FINE)), "heyoka has no step"),
-        (lambda: run_peer("splitting:2", *both, TIMES, DOUBLE, setting=("tolerance", FINE)), "has no tolerance"),
-        (lambda: run_peer("scipy:LSODA", *both, TIMES, DOUBLE, setting=("tolerance", Fraction(0))), "between 0 and 1"),
-        (lambda: run_peer("scipy:LSODA", *both, [2, 1], DOUBLE), "does not come after"),
-    ):
-        with pytest.raises(InputError, match=message):
-            call()
+@pytest.mark.parametrize(
+    ("name", "control", "size", "message"),
+    [
+        ("heyoka", "step", FINE, "heyoka has no step"),
+        ("splitting:2", "tolerance", FINE, "has no tolerance"),
+        ("scipy:LSODA", "tolerance", Fraction(0), "between 0 and 1"),
+    ],
+)
+def test_what_does_not_control_a_peer_is_refused(name: str, control: str, size: Fraction, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        run_peer(name, CASES["euler"].top, CASES["euler"].start, TIMES, DOUBLE, setting=(control, size))
 
 
 EXAMPLE = (Path(__file__).parents[2] / "examples" / "mine" / "mine.py").read_text("utf-8")

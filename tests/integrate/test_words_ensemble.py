@@ -12,7 +12,6 @@ from heavytop.integrate.multiword.lanes import propagate_multiword_ensemble
 from heavytop.integrate.multiword.motions import propagate_multiword
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, QUAD
-from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
 from support.helpers import bits, distance
@@ -117,25 +116,6 @@ def test_observer_and_finished_are_called_in_order() -> None:
     assert sorted(over) == list(range(9))
     assert all(times == [Fraction(t) for t in TIMES] for times in seen.values())
     assert all(len(run.states) == 0 and len(run.times) == 4 for run in runs)
-
-
-def test_an_observer_that_raises_ends_the_ensemble() -> None:
-    def observer(index: int, time: Fraction, state: object) -> None:
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        propagate_multiword_ensemble(problems(), TIMES, observer=observer, threads=2)
-
-
-@pytest.mark.slow
-def test_other_formats_and_attitudes_have_the_bits_of_single_runs() -> None:
-    start = State((1, "1/2", "1/3"), ("3/5", 0, "4/5"))
-    xi = perpendicular(start.gamma)
-    for precision, vector in ((QUAD, None), (DOUBLE, xi)):
-        given = [Problem.of(TOP, start, precision, xi=vector)] * 3
-        alone = propagate_multiword(TOP, start, TIMES, precision, xi=vector)
-        for run in propagate_multiword_ensemble(given, TIMES, threads=2):
-            assert bits(run) == bits(alone)
 
 
 @pytest.mark.slow

@@ -73,28 +73,29 @@ def test_a_step_in_split_coefficients_differs_by_less_than_its_ladder_allows(sys
         assert split.counts[dd.USED_TRIES] < parts.MOST_TRIES
 
 
-@pytest.mark.parametrize("factor", [2.0**-40, 2.0**-8, 2.0**8, 2.0**40], ids=["tiny", "small", "large", "huge"])
-def test_a_step_with_units_that_do_not_fit_is_done_again(factor: float) -> None:
+def scaled_units(run: Floating, factor: float) -> None:
+    run.words[run.layout.units : run.layout.units + 8] *= factor
+
+
+def another_slope(run: Floating, slope: int) -> None:
+    run.counts[dd.SLOPE] = slope
+
+
+@pytest.mark.parametrize(
+    ("spoil", "number"),
+    [(scaled_units, 2.0**k) for k in (-40, -8, 8, 40)]
+    + [(another_slope, slope) for slope in (2**20, -(2**20), 30 * 2**16, 2**62, -(2**62))],
+)
+def test_a_step_with_units_or_a_slope_that_do_not_fit_is_done_again(spoil, number) -> None:
     known, run = (Floating(problem(), FINE, True) for _ in range(2))
     for one in (known, run):
         one.advance(Fraction(3), 10**6)
-    run.words[run.layout.units : run.layout.units + 8] *= factor
+    spoil(run, number)
     for one in (known, run):
         one.advance(one.time + Fraction(1, 10**9), 1)
     # units that are too coarse from the first order on are not used at all
-    assert run.counts[dd.USED_TRIES] == (factor < 2**40)
+    assert spoil is another_slope or run.counts[dd.USED_TRIES] == (number < 2**40)
     assert known.counts[dd.USED_TRIES] == 0
-    assert max(abs(a - b) for a, b in zip(known.state, run.state, strict=True)) < Fraction(1, 2**79)
-
-
-@pytest.mark.parametrize("slope", [2**20, -(2**20), 30 * 2**16, 2**62, -(2**62)])
-def test_a_step_with_a_slope_that_does_not_fit_is_done_again(slope: int) -> None:
-    known, run = (Floating(problem(), FINE, True) for _ in range(2))
-    for one in (known, run):
-        one.advance(Fraction(3), 10**6)
-    run.counts[dd.SLOPE] = slope
-    for one in (known, run):
-        one.advance(one.time + Fraction(1, 10**9), 1)
     assert max(abs(a - b) for a, b in zip(known.state, run.state, strict=True)) < Fraction(1, 2**79)
 
 

@@ -11,7 +11,7 @@ from flint import arb, fmpq
 from heavytop.exact.flint.balls import ball, working_precision
 from heavytop.integrate.heyoka.engines import expressions
 from heavytop.precision import cross
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, SYSTEMS, Parameters
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, SYSTEMS, Parameters
 from heavytop.top.heavy_top import HeavyTop, State
 from support.helpers import fraction, moments, positive, unit_vector, vector
 
@@ -75,7 +75,8 @@ def test_the_attitude_vector_turns_with_the_body_s_own_angular_velocity() -> Non
     random = Random(4)
     p, y = random_problem(random)
     xi = unit_vector(random)
-    assert HEAVY_TOP.attitude(p, y, xi) == cross(xi, y[:3])
+    for system in (HEAVY_TOP, HEAVY_GYROSTAT):
+        assert system.attitude(p._replace(rotor=vector(random)), y, xi) == cross(xi, y[:3])
     assert GYROSTAT.attitude(p, y, xi) == cross(xi, (y[0], y[1] + p.rotor, y[2]))
 
 

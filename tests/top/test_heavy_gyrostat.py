@@ -9,7 +9,7 @@ from flint import fmpq_mpoly_ctx
 
 from heavytop.errors import InputError
 from heavytop.exact.closed_form import orientation, renamed_state, renamed_top
-from heavytop.precision import cross, dot
+from heavytop.precision import dot
 from heavytop.top.amplification import rate
 from heavytop.top.equations import (
     GYROSTAT,
@@ -172,11 +172,6 @@ def test_a_motion_on_renamed_axes_is_the_renamed_motion() -> None:
         found = heavy_gyrostat(HEAVY_GYROSTAT.parameters(other, moved), moved.flat)
         d = orientation(axes)
         assert found == (*(d * rates[axis] for axis in axes), *(rates[3 + axis] for axis in axes))
-
-
-def test_a_vector_fixed_in_space_turns_as_gamma_does() -> None:
-    p, y, xi = Parameters((3, 2, 1), (1, 2, 3), (4, 5, 6)), (1, 2, 3, 4, 5, 6), (7, 8, 9)
-    assert HEAVY_GYROSTAT.attitude(p, y, xi) == cross(xi, y[:3])
 
 
 def test_a_top_says_its_rotor_and_differs_by_it() -> None:
