@@ -5,6 +5,7 @@ What binary64 gives must be at least what the theorem asks for, and the room lef
 
 from dataclasses import replace
 from fractions import Fraction
+from itertools import pairwise
 from math import factorial
 from random import Random
 
@@ -84,22 +85,21 @@ def exponential(value):
     return sum(value**k / factorial(k) for k in range(60))
 
 
-def exact(matrix):
-    return [[Fraction(float(value)) for value in row] for row in matrix]
+exact = np.vectorize(lambda value: Fraction(float(value)), otypes=[object])
+"""The binary64 numbers of an array, as they are."""
 
 
-def norm(rows):
-    return max(sum(map(abs, row)) for row in rows)
+def norm(matrix):
+    return abs(matrix).sum(axis=1).max()
+
+
+def inverse_of(matrix):
+    found = fmpq_mat(6, 6, [rational(value) for value in matrix.flat]).inv()
+    return np.array([Fraction(int(value.p), int(value.q)) for value in found.entries()]).reshape(6, 6)
 
 
 def set_size(errors):
-    return (
-        max(
-            sum(abs(a) * Fraction(float(r)) for a, r in zip(row, errors.radii, strict=True))
-            for row in exact(errors.frame)
-        )
-        * Fraction(2) ** errors.exponent
-    )
+    return (abs(exact(errors.frame)) @ exact(errors.radii)).max() * Fraction(2) ** errors.exponent
 
 
 def theorem(found, field):
@@ -154,11 +154,9 @@ def test_a_set_of_errors_is_as_large_as_its_components_say():
         errors = Errors(rng.standard_normal((6, 6)), rng.random(6) * 10.0 ** rng.integers(-5, 20), 0)
         matrix, slack = rng.standard_normal((6, 6)), float(rng.random())
         for frame, found, more in ((errors.frame, errors.sizes(), 0.0), (matrix, errors.sizes(matrix, slack), slack)):
-            widest = Fraction(float(errors.radii.max()))
-            for row, bound in zip(exact(frame), found, strict=True):
-                true = sum(abs(a) * Fraction(float(r)) for a, r in zip(row, errors.radii, strict=True))
-                true += Fraction(more) * widest
-                assert true <= Fraction(float(bound)) <= true * (1 + Fraction(1, 2**30))
+            true = abs(exact(frame)) @ exact(errors.radii) + Fraction(more) * exact(errors.radii).max()
+            assert (true <= exact(found)).all()
+            assert (exact(found) <= true * (1 + Fraction(1, 2**30))).all()
 
 
 def exact_variation(found, top):
@@ -176,7 +174,8 @@ def exact_variation(found, top):
             v = [x + fmpq_poly([0] * (n + 1) + [half * (a - b)[n] / (n + 1)])
                  for x, a, b in zip(v, up, down, strict=True)]  # fmt: skip
         columns.append(v)
-    return [[[Fraction(int(v[i][n].p), int(v[i][n].q)) for v in columns] for i in SIX] for n in range(top + 1)]
+    powers = [[[v[i][n] for v in columns] for i in SIX] for n in range(top + 1)]
+    return np.vectorize(lambda value: Fraction(int(value.p), int(value.q)), otypes=[object])(powers)
 
 
 @pytest.mark.slow
@@ -184,16 +183,12 @@ def exact_variation(found, top):
 def test_the_variation_is_known_within_its_error(precision):
     found = step(FIELD, node_with(precision, 0.5), precision)
     true = exact_variation(found, 40)
-    summed = [[sum((m[i][j] for m in true), Fraction(0)) for j in SIX] for i in SIX]
-    given = exact(found.variation.sum(axis=0))
-    off = norm([[a - b for a, b in zip(x, y, strict=True)] for x, y in zip(summed, given, strict=True)])
-    error = Fraction(found.summed_error)
+    off, error = norm(true.sum(axis=0) - exact(found.variation.sum(axis=0))), Fraction(found.summed_error)
     # beyond τ^40 next to nothing is left at half the radius of convergence
     assert off <= error
     assert error < Fraction(1, 2**40)
     for n, matrix in enumerate(found.variation):
-        gap = norm([[a - b for a, b in zip(x, y, strict=True)] for x, y in zip(true[n], exact(matrix), strict=True)])
-        assert gap <= Fraction(found.variation_error)
+        assert norm(true[n] - exact(matrix)) <= Fraction(found.variation_error)
         assert norm(exact(matrix)) <= Fraction(found.powers)
 
 
@@ -205,28 +200,11 @@ def test_the_error_of_the_variation_holds_its_defect(h, field):
     series = Whole([[value] for value in node.centre], 64)
     slopes = h * 2 * float(field.q) * np.array([float(max(map(abs, node.centre))) / 2.0**64])
     given, _, error = enclosure._variation(field, series, h, slopes)
-    state = [Fraction(int(value), 2**64) for value in node.centre]
-    slope = [[Fraction(h) * (sum(Fraction(float(field.jacobian[i, j, k])) * state[k] for k in SIX)
-                             + Fraction(float(field.slope[i, j]))) for j in SIX] for i in SIX]  # fmt: skip
-    powers = [*map(exact, given), [[Fraction(0)] * 6] * 6]
-    defect = Fraction(0)
-    for n in range(len(powers) - 1):
-        left = [[(n + 1) * value for value in row] for row in powers[n + 1]]
-        defect += norm(minus(left, product(slope, powers[n]))) / (n + 1)
-    assert defect <= Fraction(error)
-
-
-def inverse_of(matrix):
-    found = fmpq_mat(6, 6, [rational(value) for row in matrix for value in row]).inv()
-    return [[Fraction(int(found[i, j].p), int(found[i, j].q)) for j in SIX] for i in SIX]
-
-
-def product(a, b):
-    return [[sum((a[i][k] * b[k][j] for k in SIX), Fraction(0)) for j in range(len(b[0]))] for i in SIX]
-
-
-def minus(a, b):
-    return [[x - y for x, y in zip(p, q, strict=True)] for p, q in zip(a, b, strict=True)]
+    state = np.array([Fraction(int(value), 2**64) for value in node.centre])
+    slope = Fraction(h) * (exact(field.jacobian) @ state + exact(field.slope))
+    powers = [*map(exact, given), exact(np.zeros((6, 6)))]
+    defects = [norm(n * after - slope @ before) / n for n, (before, after) in enumerate(pairwise(powers), 1)]
+    assert sum(defects) <= Fraction(error)
 
 
 @pytest.mark.slow
@@ -243,15 +221,13 @@ def test_a_new_frame_pays_for_all_that_it_is_not(uncertain, size, skew, monkeypa
         monkeypatch.setattr(np.linalg, "qr", lambda matrix, noise=noise: (factorised(matrix)[0] + noise, None))
         frame, turned, slack = enclosure._new_frame(variation, uncertain, errors)
         back, bound = inverse_of(exact(frame)), Fraction(slack)
-        assert norm(minus(back, exact(frame.T))) <= bound
+        assert norm(back - exact(frame.T)) <= bound
         # the disturbance that the bound is for: all of it in the row and with the signs that count most
-        carried = product(exact(variation), exact(errors.frame))
+        signs = np.where(errors.frame.sum(axis=1) >= 0, 1, -1)
         for row in SIX:
-            signs = [1 if value >= 0 else -1 for value in (errors.frame.sum(axis=1))]
-            moved = [[Fraction(uncertain) * s / 6 if i == row else Fraction(0) for s in signs] for i in SIX]
-            whole = [[a + b for a, b in zip(p, q, strict=True)]
-                     for p, q in zip(carried, product(moved, exact(errors.frame)), strict=True)]  # fmt: skip
-            assert norm(minus(product(back, whole), exact(turned))) <= bound
+            moved = exact(np.zeros((6, 6)))
+            moved[row] = Fraction(uncertain) / 6 * signs
+            assert norm(back @ (exact(variation) + moved) @ exact(errors.frame) - exact(turned)) <= bound
         assert bound <= Fraction(1, 10**11) + 20 * Fraction(uncertain) + 10**4 * Fraction(skew)
 
 
@@ -278,9 +254,8 @@ def test_what_is_not_known_of_the_variation_widens_the_state(uncertain):
     errors, unit = found.node.errors, ulp(found)
     with working_precision(300):
         balls = found.at(Fraction(1))
-    moved = product(exact(found.variation.sum(axis=0)), exact(errors.frame))
-    for ball, row in zip(balls, moved, strict=True):
-        linear = sum(abs(a) * Fraction(float(r)) for a, r in zip(row, errors.radii, strict=True))
+    moved = abs(exact(found.variation.sum(axis=0)) @ exact(errors.frame)) @ exact(errors.radii)
+    for ball, linear in zip(balls, moved, strict=True):
         assert radius(ball) >= (linear + Fraction(uncertain) * set_size(errors)) * unit
     with_it, without = found.end().errors, replace(found, variation_error=0.0).end().errors
     assert all(with_it.radii >= without.radii)
@@ -292,9 +267,9 @@ def test_what_a_step_adds_is_carried_into_every_direction_of_the_new_frame():
     found = step(FIELD, node_with(128, 1e4), 128)
     still = Errors(found.node.errors.frame, np.zeros(6), 0)
     following = replace(found, node=replace(found.node, errors=still), local=1e6).end()
-    for row, r in zip(inverse_of(exact(following.errors.frame)), following.errors.radii, strict=True):
-        needed = sum(map(abs, row)) * 10**6
-        assert needed <= Fraction(float(r)) <= needed * (1 + Fraction(1, 10**6))
+    needed = abs(inverse_of(exact(following.errors.frame))).sum(axis=1) * 10**6
+    assert (needed <= exact(following.errors.radii)).all()
+    assert (exact(following.errors.radii) <= needed * (1 + Fraction(1, 10**6))).all()
 
 
 def true_motion(displaced, time, bits=300):
@@ -319,14 +294,10 @@ def test_motions_from_the_edge_of_the_set_stay_inside(size):
             moved = [c + Fraction(size) * int(sign * s) for c, s in zip(centre, rows, strict=True)]
             for tau, balls in sets.items():
                 assert_overlap(balls, true_motion(moved, tau * found.length))
-            gap = [
-                [midpoint(true) - Fraction(int(c), 2**precision)]
-                for true, c in zip(true_motion(moved, found.length), following.centre, strict=True)
-            ]
-            for (x,), r in zip(product(inverse_of(exact(following.errors.frame)), gap), following.errors.radii,
-                               strict=True):  # fmt: skip
-                scale = Fraction(2) ** following.errors.exponent / 2**precision
-                assert abs(x) <= Fraction(float(r)) * scale + Fraction(1, 2**200)
+            ends = zip(true_motion(moved, found.length), following.centre, strict=True)
+            gap = np.array([midpoint(true) - Fraction(int(c), 2**precision) for true, c in ends])
+            room = exact(following.errors.radii) * Fraction(2) ** (following.errors.exponent - precision)
+            assert (abs(inverse_of(exact(following.errors.frame)) @ gap) <= room + Fraction(1, 2**200)).all()
 
 
 def test_errors_beyond_what_the_theorem_admits_are_no_step():
@@ -384,11 +355,8 @@ def test_the_sum_and_the_product_of_the_variation_have_room_for_their_roundings(
     made = replace(
         found, node=replace(found.node, errors=errors), variation=variation, powers=2.1, variation_error=0.0, local=0.0
     )
-    exact = [[Fraction(value) for value in row] for row in variation[0].tolist()]
-    columns = [[Fraction(value) for value in column] for column in frame.T.tolist()]
-    for row, bound in zip(exact, made.radii(Fraction(1)), strict=True):
-        sizes = [abs(sum(a * b for a, b in zip(row, column, strict=True))) for column in columns]
-        assert Fraction(float(bound)) >= sum(sizes[:2])
+    sizes = abs(exact(variation[0]) @ exact(frame))[:, :2].sum(axis=1)
+    assert (sizes <= exact(made.radii(Fraction(1)))).all()
 
 
 @pytest.mark.parametrize(("quadratic", "linear"), [(0.0, 0.75), (0.75, 0.0), (0.5, 0.25)])
