@@ -86,16 +86,6 @@ def test_taylor_coefficients_of_a_known_motion_obey_the_a_priori_bound():
                 assert abs(midpoint(value) - midpoint(true)) <= tail
 
 
-def test_balls_do_not_depend_on_what_was_asked_before():
-    fresh, used = motion(VECTORS[0]), motion(VECTORS[0])
-    for earlier in (Fraction(25), Fraction(3), Fraction(-2), Fraction(40)):
-        used.state(earlier, 120)
-    for time in (Fraction(24), Fraction(61, 2)):
-        for one, two in zip(fresh.state(time, 120), used.state(time, 120), strict=True):
-            assert midpoint(one) == midpoint(two)
-            assert radius(one) == radius(two)
-
-
 def test_increasing_times_continue_from_what_is_known():
     solution = motion(VECTORS[0])
     solution.state(Fraction(30), 100)

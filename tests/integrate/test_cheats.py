@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import pytest
 
@@ -19,7 +20,7 @@ from heavytop.harness.rows import measure
 from heavytop.measure.integrator import Repeats
 from heavytop.records import Row
 from support.helpers import named_peers
-from support.reports import expand, load
+from support.reports import expand, plan_of
 
 MODULE = '''
 import os
@@ -107,11 +108,6 @@ def coarse(where):
     return peer
 
 
-one_time_coarse = coarse(lambda start, times: len(times) == 1)
-many_times_coarse = coarse(lambda start, times: len(times) > 1)
-every_other_coarse = coarse(lambda *_: counted("other") % 2)
-first_fine = coarse(lambda *_: counted("first") >= 4)
-known_start_fine = coarse(lambda start, times: start.omega[0].denominator >= 1000)
 
 
 # from memory
@@ -127,13 +123,9 @@ def remembering(key_of):
     return peer
 
 
-memory = remembering(lambda start: start)
-rough_memory = remembering(lambda start: tuple(round(float(value), 9) for value in start.flat))
 
 
 # two equal calls
-random = changed(states=lambda found: found.states * (1 + 1e-15 * numpy.frombuffer(os.urandom(6), "u1")))
-other_steps = changed(steps=lambda found: found.steps + counted("steps"))
 
 
 def random_samples(top, start, times, precision, *, system, tolerance=None):
@@ -156,10 +148,6 @@ def sometimes(top, start, times, precision, *, system, tolerance=None):
 
 
 # counts
-one_step = changed(steps=lambda found: 1)
-no_step = changed(steps=lambda found: 0)
-few_evaluations = changed(evaluations=lambda found: 1)
-few_steps = changed(steps=lambda found: max(1, found.steps // 30), order=lambda found: 8)
 
 
 def _fixed(factor):
@@ -170,7 +158,6 @@ def _fixed(factor):
 
 
 fixed = double_peer("mine:fixed", 2, _fixed(1), "step")
-fixed_few = double_peer("mine:fixed_few", 2, _fixed(1 / 50), "step")
 fixed_many = double_peer("mine:fixed_many", 2, _fixed(50), "step")
 
 
@@ -201,80 +188,95 @@ class Two(Trajectory):
 somebody = changed(integrator=lambda found: "heyoka")
 '''
 CHEATS = {
-    "one_time_coarse": "asked for its last time alone, ended ",
-    "many_times_coarse": "",
-    "every_other_coarse": " two equal calls as success at t = 20 in ",
-    "first_fine": "the seconds are those of another run",
-    "known_start_fine": "from a start units in the last place away, ended ",
-    "memory": "it keeps results between calls",
-    "rough_memory": "it keeps results between calls",
-    "random": " in two equal calls",
-    "random_samples": " in two equal calls",
-    "last_bit": " in two equal calls",
-    "other_steps": "ended two equal calls as success at t = 20 in ",
-    "sometimes": "raised ValueError: not today",
-    "no_step": "counts its steps wrongly: it moved, and says that it took no step",
-    "fixed_few": "where each is 0.01",
-    "field_of_its_own": "changed the field of the system heavy_top",
+    "one_time_coarse": ("coarse(lambda start, times: len(times) == 1)", "asked for its last time alone, ended "),
+    "many_times_coarse": ("coarse(lambda start, times: len(times) > 1)", ""),
+    "every_other_coarse": ('coarse(lambda *_: counted("other") % 2)', " two equal calls as success at t = 20 in "),
+    "first_fine": ('coarse(lambda *_: counted("first") >= 4)', "the seconds are those of another run"),
+    "known_start_fine": (
+        "coarse(lambda start, times: start.omega[0].denominator >= 1000)",
+        "from a start units in the last place away, ended ",
+    ),
+    "memory": ("remembering(lambda start: start)", "it keeps results between calls"),
+    "rough_memory": (
+        "remembering(lambda start: tuple(round(float(value), 9) for value in start.flat))",
+        "it keeps results between calls",
+    ),
+    "random": (
+        'changed(states=lambda found: found.states * (1 + 1e-15 * numpy.frombuffer(os.urandom(6), "u1")))',
+        " in two equal calls",
+    ),
+    "random_samples": (None, " in two equal calls"),
+    "last_bit": (None, " in two equal calls"),
+    "other_steps": (
+        'changed(steps=lambda found: found.steps + counted("steps"))',
+        "ended two equal calls as success at t = 20 in ",
+    ),
+    "sometimes": (None, "raised ValueError: not today"),
+    "no_step": ("changed(steps=lambda found: 0)", "counts its steps wrongly: it moved, and says that it took no step"),
+    "fixed_few": ('double_peer("mine:fixed_few", 2, _fixed(1 / 50), "step")', "where each is 0.01"),
+    "field_of_its_own": (None, "changed the field of the system heavy_top"),
 }
-"""What the row of each says, or "" where nothing is hidden by it: its error and seconds are the ones of such a run."""
+"""Each one, None where it is in the module, and what its row says, or "" where nothing is hidden by it: its error and
+seconds are the ones of such a run.
+"""
 DOUBTED = {
-    "one_step": "It counts 1 steps of ",
-    "few_steps": "or takes more steps than it counts.",
-    "few_evaluations": " steps, and 1 evaluations of the field.",
+    "one_step": ("changed(steps=lambda found: 1)", "It counts 1 steps of "),
+    "few_steps": (
+        "changed(steps=lambda found: max(1, found.steps // 30), order=lambda found: 8)",
+        "or takes more steps than it counts.",
+    ),
+    "few_evaluations": ("changed(evaluations=lambda found: 1)", " steps, and 1 evaluations of the field."),
 }
 """What is said of counts that are no proof: there are motions on which a method is exact."""
 TIMED = ("no_time", "all_compiling", "slow", "slow_compiling", "later", "fractions", "somebody", "honest")
 STEPPED = ("fixed", "fixed_few", "fixed_many")
 
 
-@pytest.fixture
-def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+@pytest.fixture(autouse=True)
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Another package with all of them."""
-    (tmp_path / "cheats.py").write_text(MODULE)
+    lines = [f"{name} = {code}" for name, (code, _) in (CHEATS | DOUBTED).items() if code]
+    (tmp_path / "cheats.py").write_text("\n".join([MODULE, *lines]))
     named_peers(tmp_path, {name: f"cheats:{name}" for name in (*CHEATS, *DOUBTED, *TIMED, *STEPPED)})
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(work_precision, "_USUAL", Repeats(3, 3, 0.0))
-    return tmp_path
 
 
-def rows(folder: Path, *names: str, case: str = "euler", kind: str = "") -> list[Row]:
-    (folder / "plan.toml").write_text(f'name = "p"\n{kind or work(case, *names)}', "utf-8")
-    tasks = expand(load(str(folder / "plan.toml"))[0])
+def rows(*names: str, case: str = "euler") -> list[Row]:
+    controls = [{"steps": ["1/100"]} if name in STEPPED else {"tolerances": ["1e-9"]} for name in names]
+    ladders = [{"integrator": f"mine:{name}"} | control for name, control in zip(names, controls, strict=True)]
+    return measured(kind="work_precision", cases=[case], horizon="20", samples=5, ladders=ladders)
+
+
+def measured(**table: Any) -> list[Row]:
+    tasks = expand(plan_of({"name": "p", "measure": [table]}))
     return [measure(KINDS[task.key.kind], task, Saved()) for task in tasks]
 
 
-def work(case: str, *names: str) -> str:
-    rungs = {name: 'steps = ["1/100"]' if name in STEPPED else 'tolerances = ["1e-9"]' for name in names}
-    ladders = ", ".join(f'{{ integrator = "mine:{name}", {rung} }}' for name, rung in rungs.items())
-    head = f'[[measure]]\nkind = "work_precision"\ncases = ["{case}"]\nhorizon = "20"\nsamples = 5\n'
-    return f"{head}ladders = [{ladders}]\n"
-
-
-def single_steps(name: str) -> str:
-    head = '[[measure]]\nkind = "local_error"\ncases = ["lagrange"]\nprecisions = ["double"]\nhorizon = "4"\n'
-    return f'{head}integrator = "mine:{name}"\n'
+def single_steps(name: str) -> list[Row]:
+    data = {"cases": ["lagrange"], "precisions": ["double"], "horizon": "4", "integrator": f"mine:{name}"}
+    return measured(kind="local_error", **data)
 
 
 @pytest.mark.slow
-def test_a_cheat_is_a_row_that_fails_with_what_was_observed_and_the_others_go_on(package: Path) -> None:
-    *cheats, honest = rows(package, *CHEATS, "honest")
+def test_a_cheat_is_a_row_that_fails_with_what_was_observed_and_the_others_go_on() -> None:
+    *cheats, honest = rows(*CHEATS, "honest")
     assert honest.outcome == "success"
     for name, cheat in zip(CHEATS, cheats, strict=True):
-        if not CHEATS[name]:
+        if not CHEATS[name][1]:
             assert float(cheat.metrics["error_max"].value) > 1e3 * float(honest.metrics["error_max"].value)
             continue
         assert (name, cheat.outcome, cheat.metrics, cheat.seconds) == (name, "failed", {}, {})
-        assert CHEATS[name] in cheat.reference.reason
+        assert CHEATS[name][1] in cheat.reference.reason
         assert cheat.reference.reason.startswith(f"mine:{name}")
         assert cheat.reference.reason.isprintable()
         assert len(cheat.reference.reason) < 400
 
 
 @pytest.mark.slow
-def test_seconds_are_those_of_the_clock_here(package: Path) -> None:
+def test_seconds_are_those_of_the_clock_here() -> None:
     began = perf_counter()
-    found = dict(zip(TIMED, rows(package, *TIMED), strict=True))
+    found = dict(zip(TIMED, rows(*TIMED), strict=True))
     passed = perf_counter() - began
     assert {name: row.reference.reason for name, row in found.items() if row.outcome != "success"} == {}
     for name, row in found.items():
@@ -284,9 +286,9 @@ def test_seconds_are_those_of_the_clock_here(package: Path) -> None:
     assert sum(row.seconds["compile"] + row.seconds["run"] for row in found.values()) <= passed
 
 
-def test_whatever_is_done_to_the_arguments_and_whoever_it_says_it_is_the_row_is_its_own(package: Path) -> None:
+def test_whatever_is_done_to_the_arguments_and_whoever_it_says_it_is_the_row_is_its_own() -> None:
     before = repr(CASES["euler"])
-    honest, *others = rows(package, "honest", "fractions", "somebody")
+    honest, *others = rows("honest", "fractions", "somebody")
     assert repr(CASES["euler"]) == before
     for row in others:
         assert row.metrics["error_max"] == honest.metrics["error_max"]
@@ -295,20 +297,20 @@ def test_whatever_is_done_to_the_arguments_and_whoever_it_says_it_is_the_row_is_
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ["lagrange", "generic", "gyrostat"])
-def test_an_honest_one_is_measured_on_every_kind_of_motion(package: Path, case: str) -> None:
-    assert [row.outcome for row in rows(package, "honest", "fixed", case=case)] == ["success"] * 2
+def test_an_honest_one_is_measured_on_every_kind_of_motion(case: str) -> None:
+    assert [row.outcome for row in rows("honest", "fixed", case=case)] == ["success"] * 2
 
 
 @pytest.mark.slow
-def test_a_doubtful_count_is_said_and_no_failure(package: Path) -> None:
-    for name, row in zip(DOUBTED, rows(package, *DOUBTED), strict=True):
+def test_a_doubtful_count_is_said_and_no_failure() -> None:
+    for name, row in zip(DOUBTED, rows(*DOUBTED), strict=True):
         assert row.outcome == "success"
-        assert (row.explained.kind, DOUBTED[name] in row.explained.text) == ("steps", True)
+        assert (row.explained.kind, DOUBTED[name][1] in row.explained.text) == ("steps", True)
 
 
 @pytest.mark.slow
-def test_a_count_of_steps_makes_no_step_shorter_that_has_its_length_given(package: Path) -> None:
-    (honest,), (many,) = (rows(package, kind=single_steps(name)) for name in ("fixed", "fixed_many"))
+def test_a_count_of_steps_makes_no_step_shorter_that_has_its_length_given() -> None:
+    (honest,), (many,) = (single_steps(name) for name in ("fixed", "fixed_many"))
     assert (honest.outcome, honest.metrics, honest.steps) == ("success", many.metrics, many.steps / 50)
 
 
@@ -320,10 +322,10 @@ def test_a_count_of_steps_makes_no_step_shorter_that_has_its_length_given(packag
         ("other_steps", "growth"),
     ],
 )
-def test_two_equal_calls_that_differ_are_said_so_in_every_kind(package: Path, name: str, kind: str) -> None:
-    run = {"drift": 'horizon = "2", samples = 4', "growth": 'horizon = "2", samples = 4, decades = 1, starts = 8'}
-    table = f'[[measure]]\nkind = "{kind}"\ncases = ["lagrange"]\nintegrator = "mine:{name}"\n'
-    table += f'runs = [{{ precision = "double", {run[kind]} }}]\n' if kind in run else ""
-    (row,) = rows(package, kind=single_steps(name) if kind == "local_error" else table)
+def test_two_equal_calls_that_differ_are_said_so_in_every_kind(name: str, kind: str) -> None:
+    more = {"decades": 1, "starts": 8} if kind == "growth" else {}
+    runs = [{"precision": "double", "horizon": "2", "samples": 4} | more]
+    data = {"cases": ["lagrange"], "integrator": f"mine:{name}", "runs": runs}
+    (row,) = single_steps(name) if kind == "local_error" else measured(kind=kind, **data)
     assert row.outcome == "failed"
     assert "two equal calls" in row.reference.reason

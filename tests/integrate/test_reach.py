@@ -1,7 +1,6 @@
 """A run of more steps than anyone waits for is refused, by every door and in every unit; any other is taken."""
 
 from fractions import Fraction
-from pathlib import Path
 from time import perf_counter
 
 import pytest
@@ -16,7 +15,7 @@ from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.multiword.fixed_point.fixed_point_run import LONGEST_STEP
 from heavytop.top.equations import square_of_rate
 from support.helpers import in_units
-from support.reports import expand, load, rows
+from support.reports import expand, plan_of, rows
 
 TOP = ht.HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
 START = ht.State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
@@ -105,22 +104,21 @@ def test_the_command_line_says_so_with_exit_3(omega: str, time: str) -> None:
     assert perf_counter() - began < 5
 
 
-def test_rows_of_every_kind_that_integrates_are_out_of_reach(tmp_path: Path) -> None:
-    top = 'inertia = ["2", "2", "1"]\nweight = "1"\ncentre = ["0", "0", "1"]\ngamma = ["3/5", "0", "4/5"]\n'
-    plan = f'name = "far"\n[[top]]\nname = "fast"\nomega = ["0", "0", "1e150"]\n{top}'
-    at_once = 'cases = ["fast"]\nhorizon = "10"\n'
-    for kind, more in {
-        "drift": 'cases = ["fast"]\nruns = [{ precision = "double", horizon = "10", samples = 5 }]\n',
-        "growth": 'cases = ["fast"]\nruns = [{ precision = "double", horizon = "10", starts = 8 }]\n',
-        "local_error": f'{at_once}precisions = ["double"]\n',
-        "work_precision": f'{at_once}ladders = [{{ integrator = "splitting:2", tolerances = ["eps"] }}]\n',
-    }.items():
-        plan += f'[[measure]]\nkind = "{kind}"\n{more}'
-    plan += '[[measure]]\nkind = "work_precision"\ncases = ["euler"]\nhorizon = "1"\n'
-    plan += 'ladders = [{ integrator = "splitting:2", steps = ["1e-100"] }]\n'
-    (tmp_path / "plan.toml").write_text(plan)
+def test_rows_of_every_kind_that_integrates_are_out_of_reach() -> None:
+    top = {"name": "fast", "inertia": ["2", "2", "1"], "weight": "1", "centre": ["0", "0", "1"]}
+    top |= {"omega": ["0", "0", "1e150"], "gamma": ["3/5", "0", "4/5"]}
+    run, at_once = {"precision": "double", "horizon": "10"}, {"cases": ["fast"], "horizon": "10"}
+    kinds = [
+        {"kind": "drift", "cases": ["fast"], "runs": [run | {"samples": 5}]},
+        {"kind": "growth", "cases": ["fast"], "runs": [run | {"starts": 8}]},
+        at_once | {"kind": "local_error", "precisions": ["double"]},
+        *(
+            at_once | {"kind": "work_precision", "cases": [case], "ladders": [{"integrator": "splitting:2"} | control]}
+            for case, control in (("fast", {"tolerances": ["eps"]}), ("euler", {"steps": ["1e-100"]}))
+        ),
+    ]
     began = perf_counter()
-    found = list(rows(expand(load(str(tmp_path / "plan.toml"))[0]), 1, None))
+    found = list(rows(expand(plan_of({"name": "far", "top": [top], "measure": kinds})), 1, None))
     assert perf_counter() - began < 5
     assert len(found) == 5
     assert {row.outcome for _, row in found} == {"out_of_reach"}

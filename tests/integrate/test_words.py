@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Callable
 from fractions import Fraction
 from functools import lru_cache
 from random import Random
@@ -11,8 +12,8 @@ import pytest
 from heavytop.errors import Contradiction, InputError
 from heavytop.exact.cases.gyrostat import Gyrostat
 from heavytop.exact.catalogue import find
+from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import midpoint
-from heavytop.exact.solution import ExactSolution
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.multiword import engines
 from heavytop.integrate.multiword import motions as words_module
@@ -45,11 +46,13 @@ EVERY_FORMAT = [
 ]
 
 
-def truth(problem: Problem) -> ExactSolution:
-    """The proven motion from the rounded data."""
+def truth(problem: Problem) -> Callable[[Fraction, int], list]:
+    """The states of the proven motion from the rounded data."""
+    if problem.xi:
+        return Validated(problem.top, problem.start, problem.system, xi=problem.xi).with_attitude
     if problem.system is GYROSTAT:
-        return Gyrostat(problem.top, problem.start, problem.parameters.rotor)
-    return find(problem.top, problem.start, problem.system)
+        return Gyrostat(problem.top, problem.start, problem.parameters.rotor).state
+    return find(problem.top, problem.start, problem.system).state
 
 
 def worst(run: Trajectory) -> Fraction:
@@ -57,7 +60,7 @@ def worst(run: Trajectory) -> Fraction:
     proven, precision = truth(run.problem), run.problem.precision
     found = Fraction(0)
     for time, state in zip(run.times, bits(run), strict=True):
-        for ball, value in zip(proven.state(time, precision.bits + 24), state, strict=True):
+        for ball, value in zip(proven(time, precision.bits + 24), state, strict=True):
             centre = midpoint(ball)
             found = max(found, abs(value - centre) / max(1, abs(centre)) / precision.eps)
     return found

@@ -7,7 +7,7 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.precision import dot
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, system
+from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
 from support.helpers import unit_vector, vector
 
@@ -76,13 +76,6 @@ def test_the_gyrostat_says_why_it_refuses_a_start() -> None:
     gamma = unit_vector(random)
     start = State([7 * g / i for g, i in zip(gamma, top.inertia, strict=True)], gamma)
     assert GYROSTAT.parameters(top, start).rotor == Fraction(1, 7)
-
-
-def test_systems_are_found_by_name() -> None:
-    assert system("heavy_top") is HEAVY_TOP
-    assert system("gyrostat") is GYROSTAT
-    with pytest.raises(InputError, match="Unknown system 'top'"):
-        system("top")
 
 
 def test_numbers_beyond_every_float_are_refused_and_shown_short() -> None:
