@@ -5,10 +5,9 @@ from fractions import Fraction
 
 import pytest
 
-from heavytop.errors import InputError
+from heavytop import HeavyTop, InputError, State
 from heavytop.exact.cases.bobylev_steklov import BobylevSteklov
 from heavytop.exact.closed_form import initial_xi
-from heavytop.top.heavy_top import HeavyTop, State
 from rational_motions import bobylev_steklov_motion
 from support.proofs import assert_attitude, assert_every_digit, assert_overlap, assert_solves, positive, rational
 

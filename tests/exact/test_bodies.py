@@ -11,14 +11,13 @@ import pytest
 from flint import arb
 
 import heavytop as ht
-from heavytop.errors import InputError, OutOfReach
+from heavytop import HEAVY_GYROSTAT, HEAVY_TOP, Attitude, InputError, OutOfReach
 from heavytop.exact.bodies import BodyMotion
 from heavytop.exact.closed_form import orientation, permuted
 from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.exact.resolved import resolve
-from heavytop.top.attitude import Attitude, multiplied, rotated, transposed
+from heavytop.top.attitude import multiplied, rotated, transposed
 from heavytop.top.bodies import IDENTITY, principal_axes
-from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
 from support.full_tensor import integrate, rotation
 from support.proofs import assert_overlap
 

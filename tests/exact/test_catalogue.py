@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import pytest
 
-from heavytop.errors import InputError, OutOfReach
+from heavytop import GYROSTAT, HEAVY_GYROSTAT, HeavyTop, InputError, OutOfReach, State
 from heavytop.exact.cases.bobylev_steklov import BobylevSteklov
 from heavytop.exact.cases.delone import Delone, DeloneHomoclinic
 from heavytop.exact.cases.dokshevich import Dokshevich
@@ -25,8 +25,6 @@ from heavytop.exact.catalogue import find, matches, table
 from heavytop.exact.closed_form import ALL, ClosedForm, Renamed, renamed_state, renamed_top
 from heavytop.exact.enclosure.run import Validated
 from heavytop.precision import round_to
-from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT
-from heavytop.top.heavy_top import HeavyTop, State
 from rational_motions import bobylev_steklov_motion, grioli_motion, staude_motion, steklov_motion
 from support.proofs import assert_overlap, assert_solves
 

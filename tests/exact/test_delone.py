@@ -5,9 +5,8 @@ from fractions import Fraction
 
 import pytest
 
-from heavytop.errors import OutOfReach
+from heavytop import HeavyTop, OutOfReach, State
 from heavytop.exact.cases.delone import Delone, DeloneHomoclinic
-from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_attitude, assert_every_digit, assert_overlap, assert_solves, positive, rational
 
 TINY = Fraction(1, 10**30)

@@ -11,13 +11,12 @@ import pytest
 from flint import arb
 
 from derivatives import BITS, SIX, chain, difference, holds, known, largest_radius, laws, of
+from heavytop import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, HeavyTop, State
 from heavytop.exact.enclosure import derivatives as module
 from heavytop.exact.enclosure.derivatives import EnclosedDerivatives, derivatives, step_derivatives
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.enclosure.step import Errors, Node, in_other_bits, start_node, step
 from heavytop.exact.flint.balls import largest_singular_value, radius, relative_bits, working_precision
-from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP
-from heavytop.top.heavy_top import HeavyTop, State
 from support.helpers import in_units
 
 GENERIC = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))

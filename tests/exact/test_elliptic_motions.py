@@ -7,7 +7,7 @@ from functools import partial
 
 import pytest
 
-from heavytop.errors import InputError
+from heavytop import HeavyTop, InputError, State
 from heavytop.exact.cases.ershkov_partial import ErshkovPartial
 from heavytop.exact.cases.gyrostat import Gyrostat
 from heavytop.exact.cases.lagrange import Lagrange, LagrangeGyrostat
@@ -16,7 +16,6 @@ from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, radius, working_precision
 from heavytop.precision import dot
 from heavytop.top.attitude import perpendicular
-from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_attitude, assert_overlap, assert_solves, positive, rational, triple
 
 F = Fraction

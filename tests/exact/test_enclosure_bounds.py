@@ -13,12 +13,11 @@ import numpy as np
 import pytest
 from flint import fmpq, fmpq_mat, fmpq_poly
 
+from heavytop import GYROSTAT, HEAVY_TOP, HeavyTop, State
 from heavytop.exact.enclosure import step as enclosure
 from heavytop.exact.enclosure.run import ScaledMotion, Validated
 from heavytop.exact.enclosure.step import CAP, Errors, Node, Whole, quadratic, start_node, step
 from heavytop.exact.flint.balls import midpoint, radius, working_precision
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP
-from heavytop.top.heavy_top import HeavyTop, State
 from support.helpers import rational
 from support.proofs import assert_overlap
 

@@ -8,14 +8,13 @@ from random import Random
 import numpy as np
 import pytest
 
+from heavytop import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, HeavyTop, State
 from heavytop.exact.cases.delone import DeloneHomoclinic
 from heavytop.exact.catalogue import find
 from heavytop.exact.enclosure import run
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.enclosure.step import Errors, rounded_off, start_node, step
 from heavytop.exact.flint.balls import midpoint, radius, relative_bits, working_precision
-from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP
-from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_overlap
 
 TOP = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))

@@ -7,15 +7,14 @@ from random import Random
 
 import pytest
 
-from heavytop.errors import Contradiction
+from heavytop import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Contradiction, HeavyTop, State, System
 from heavytop.exact.enclosure import run
 from heavytop.exact.enclosure.run import ScaledMotion, Validated
 from heavytop.exact.enclosure.step import start_node, step
 from heavytop.exact.flint.balls import midpoint, radius, relative_bits
 from heavytop.multiword.fixed_point import fixed_point_run
 from heavytop.multiword.fixed_point.certified_series import CertifiedSeries, WordSeries
-from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.equations import Parameters
 from support.proofs import assert_overlap
 
 TOP = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))

@@ -11,6 +11,7 @@ import pytest
 from flint import ctx
 
 from exact.test_catalogue import SAMPLES
+from heavytop import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, HeavyTop, State
 from heavytop.exact import catalogue
 from heavytop.exact.cases.ershkov_partial import ErshkovPartial
 from heavytop.exact.catalogue import find
@@ -19,8 +20,6 @@ from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import radius, relative_bits
 from heavytop.exact.solution import hold
 from heavytop.measure.reference import reference
-from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP
-from heavytop.top.heavy_top import HeavyTop, State
 from support.helpers import in_units
 from support.proofs import assert_overlap, attitude_of
 

@@ -5,12 +5,11 @@ from fractions import Fraction
 
 import pytest
 
-from heavytop.errors import InputError, NotInClass
+from heavytop import HEAVY_GYROSTAT, HeavyTop, InputError, State
+from heavytop.errors import NotInClass
 from heavytop.exact.cases.grioli import Grioli
 from heavytop.exact.cases.staude import Staude
 from heavytop.exact.catalogue import find
-from heavytop.top.equations import HEAVY_GYROSTAT
-from heavytop.top.heavy_top import HeavyTop, State
 from rational_motions import grioli_motion, staude_motion
 from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational, triple
 

@@ -8,15 +8,14 @@ from time import process_time
 import pytest
 from flint import acb, arb, arb_mat
 
-from heavytop.errors import NotInClass, OutOfReach
+from heavytop import HEAVY_TOP, HeavyTop, OutOfReach, State
+from heavytop.errors import NotInClass
 from heavytop.exact.cases.hess import Hess, HessPendulum
 from heavytop.exact.cases.hess_transfer import MOST_SEGMENTS, Disc, Segment, System2, Transfer, plan
 from heavytop.exact.catalogue import find
 from heavytop.exact.flint.balls import ball, unit_of_time, working_precision
 from heavytop.measure.reference import reference
 from heavytop.precision import dot
-from heavytop.top.equations import HEAVY_TOP
-from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_attitude, assert_narrow, assert_overlap, assert_solves, positive, rational
 
 F = Fraction

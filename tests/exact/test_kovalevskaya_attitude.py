@@ -8,12 +8,11 @@ import pytest
 from flint import arb, fmpq_mpoly_ctx
 
 from exact.test_kovalevskaya import OTHER, TILTED, UP, motion_from
-from heavytop.errors import OutOfReach
+from heavytop import HeavyTop, OutOfReach, State
 from heavytop.exact.cases.kovalevskaya import along_gamma, level_vector
 from heavytop.exact.cases.kovalevskaya_theta import KovalevskayaLevel, start_of
 from heavytop.exact.flint.balls import ball, working_precision
 from heavytop.precision import cross, dot
-from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_attitude, assert_meets, attitude_of, positive, rational, triple
 
 F = Fraction

@@ -8,14 +8,12 @@ from time import process_time
 import pytest
 
 from exact.test_every_naming import MOTIONS, in_other_units
-from heavytop.errors import OutOfReach
+from heavytop import GYROSTAT, HEAVY_TOP, HeavyTop, OutOfReach, State
 from heavytop.exact.catalogue import find
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, midpoint, radius, unit_of_time, working_precision
 from heavytop.measure.certify import bits_of
 from heavytop.measure.reference import reference
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP
-from heavytop.top.heavy_top import HeavyTop, State
 
 DIGITS = 50
 BITS = bits_of(DIGITS)

@@ -6,12 +6,11 @@ from fractions import Fraction
 import pytest
 from flint import fmpq_mpoly_ctx
 
+from heavytop import HEAVY_GYROSTAT, HeavyTop, State
 from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplygin, Sretensky
 from heavytop.exact.catalogue import find
 from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
 from heavytop.exact.separable.abel import Rest
-from heavytop.top.equations import HEAVY_GYROSTAT
-from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
 
 F = Fraction

@@ -7,8 +7,8 @@ from time import process_time
 import pytest
 from flint import arb
 
+from heavytop import GYROSTAT, HEAVY_TOP, HeavyTop, InputError, OutOfReach, State, System
 from heavytop.cases import CASES
-from heavytop.errors import InputError, OutOfReach
 from heavytop.exact.cases.delone import DeloneHomoclinic
 from heavytop.exact.cases.ershkov_partial import ErshkovPartial
 from heavytop.exact.catalogue import find
@@ -18,8 +18,6 @@ from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.enclosure.step import quadratic
 from heavytop.exact.flint.balls import midpoint, radius, relative_bits, working_precision
 from heavytop.measure.certify import bits_of
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
-from heavytop.top.heavy_top import HeavyTop, State
 from support.helpers import VECTORS, start_of, top_of
 from support.proofs import assert_overlap, assert_solves
 

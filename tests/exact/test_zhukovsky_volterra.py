@@ -6,6 +6,7 @@ from fractions import Fraction
 import pytest
 
 import heavytop as ht
+from heavytop import HEAVY_GYROSTAT, HeavyTop, State
 from heavytop.errors import LevelNotDone
 from heavytop.exact.cases.gyrostat import Gyrostat
 from heavytop.exact.cases.zhukovsky_volterra import ZhukovskyVolterra
@@ -13,8 +14,6 @@ from heavytop.exact.catalogue import find
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import midpoint
 from heavytop.precision import dot
-from heavytop.top.equations import HEAVY_GYROSTAT
-from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_attitude, assert_narrow, assert_overlap, assert_solves, positive, rational
 
 F = Fraction

@@ -174,17 +174,6 @@ def fractions(top, start, times, precision, *, system, tolerance=None):
     return found
 
 
-# another at every look
-class Two(Trajectory):
-    __slots__ = ()
-
-    def __getattribute__(self, name):
-        found = Trajectory.__getattribute__(self, name)
-        if name in ("states", "times", "steps") and counted(name + "look") % 2 == 0:
-            return {"states": found * 2, "times": found[:1], "steps": 1}[name] if name != "times" else found[:1]
-        return found
-
-
 somebody = changed(integrator=lambda found: "heyoka")
 '''
 CHEATS = {

@@ -16,17 +16,16 @@ import numpy as np
 import pytest
 
 import heavytop as ht
+from heavytop import DOUBLE, EXTENDED, GYROSTAT, QUAD, InputError, Outcome, real
 from heavytop.cases import CASES
-from heavytop.errors import InputError, PeerFailed, Unsupported
+from heavytop.errors import PeerFailed, Unsupported
 from heavytop.harness import integrator_check
 from heavytop.integrate import registry
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.peers import command as commands
 from heavytop.integrate.peers.command import Command, number_text
 from heavytop.integrate.registry import commands_in, named
-from heavytop.integrate.trajectory import Outcome
-from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, real
-from heavytop.top.equations import GYROSTAT
+from heavytop.precision import exact, number
 from heavytop.written_numbers import number as written
 from support.helpers import judged
 

@@ -9,8 +9,8 @@ from threading import get_ident
 import numpy
 import pytest
 
+from heavytop import DOUBLE, EXTENDED, QUAD, HeavyTop, InputError, Outcome, State, real
 from heavytop.cases import CASES
-from heavytop.errors import InputError
 from heavytop.exact.catalogue import find
 from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.integrate.heyoka import lanes
@@ -18,10 +18,9 @@ from heavytop.integrate.heyoka.lanes import Lanes
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.multiword.lanes import propagate_multiword_ensemble
 from heavytop.integrate.multiword.motions import propagate_multiword
-from heavytop.integrate.trajectory import Outcome, Problem
-from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, real
+from heavytop.integrate.trajectory import Problem
+from heavytop.precision import exact
 from heavytop.top.attitude import perpendicular
-from heavytop.top.heavy_top import HeavyTop, State
 
 TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
 TIMES = [1, Fraction(5, 2), 20, 60]

@@ -14,9 +14,9 @@ import pytest
 from typer.testing import CliRunner
 
 import heavytop as ht
+from heavytop import DOUBLE, GYROSTAT, HEAVY_GYROSTAT, HeavyTop, InputError, Outcome, State
 from heavytop.cases import CASES
 from heavytop.cli import app
-from heavytop.errors import InputError
 from heavytop.exact.cases.gyrostat import Gyrostat
 from heavytop.exact.cases.staude import Staude
 from heavytop.exact.catalogue import find
@@ -25,10 +25,8 @@ from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.integrate import registry
 from heavytop.integrate.peers.command import ProgramRequest
-from heavytop.integrate.trajectory import Outcome, Problem
-from heavytop.precision import DOUBLE, exact, parse
-from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.integrate.trajectory import Problem
+from heavytop.precision import exact, parse
 from integrate.test_words import worst
 from support.full_tensor import integrate_top
 from support.helpers import unit_vector, vector

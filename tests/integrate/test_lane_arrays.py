@@ -5,6 +5,7 @@ from fractions import Fraction
 import numpy
 import pytest
 
+from heavytop import DOUBLE, DOUBLE_DOUBLE, HEAVY_TOP, HeavyTop, State
 from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.harness.sweeps import Random
 from heavytop.integrate.ensemble import propagate_ensemble
@@ -14,9 +15,7 @@ from heavytop.integrate.multiword.lanes import double_double_states
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.truth import known_motion
 from heavytop.multiword.pairs import Numerators
-from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, exact
-from heavytop.top.equations import HEAVY_TOP
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.precision import exact
 
 TIMES = [Fraction(1, 8), Fraction(1), Fraction(5, 2), Fraction(6)]
 TOLERANCE = Fraction(1, 2**96)

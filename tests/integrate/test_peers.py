@@ -9,16 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from heavytop import DOUBLE, HEAVY_TOP, QUAD, InputError, Outcome, real
 from heavytop.cases import CASES
-from heavytop.errors import InputError, MissingExtra
+from heavytop.errors import MissingExtra
 from heavytop.integrate import registry
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.peers import scipy_ivp
 from heavytop.integrate.peers.double import Request, Solved, double_peer
 from heavytop.integrate.peers.mpmath_taylor import odefun
-from heavytop.integrate.trajectory import Outcome
-from heavytop.precision import DOUBLE, QUAD, real
-from heavytop.top.equations import HEAVY_TOP
 from support.helpers import distance, named_peers, run_peer
 
 TIMES = [Fraction(1, 3), Fraction(2), Fraction(5)]

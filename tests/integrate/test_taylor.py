@@ -5,13 +5,12 @@ from fractions import Fraction
 import numpy
 import pytest
 
+from heavytop import DOUBLE, EXTENDED, GYROSTAT, HEAVY_TOP, QUAD, HeavyTop, Outcome, State
 from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.motions import Stepper, propagate
-from heavytop.integrate.trajectory import Outcome, Problem
-from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number
+from heavytop.integrate.trajectory import Problem
+from heavytop.precision import exact, number
 from heavytop.top.attitude import perpendicular
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP
-from heavytop.top.heavy_top import HeavyTop, State
 from support.helpers import bits
 
 TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))

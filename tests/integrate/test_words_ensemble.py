@@ -7,13 +7,11 @@ from random import Random
 
 import pytest
 
+from heavytop import DOUBLE, DOUBLE_DOUBLE, GYROSTAT, QUAD, HeavyTop, Outcome, State
 from heavytop.integrate.multiword import lanes
 from heavytop.integrate.multiword.lanes import propagate_multiword_ensemble
 from heavytop.integrate.multiword.motions import propagate_multiword
-from heavytop.integrate.trajectory import Outcome, Problem
-from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, QUAD
-from heavytop.top.equations import GYROSTAT
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.integrate.trajectory import Problem
 from support.helpers import bits, distance
 
 TOP = HeavyTop((2, 2, 1), 1, (0, 1, 0))

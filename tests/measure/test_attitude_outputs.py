@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 import heavytop as ht
-from heavytop.errors import InputError
-from heavytop.measure.reference import Reference
+from heavytop import InputError, Reference
 from heavytop.precision import cross, dot
 from heavytop.top.attitude import SEQUENCES, rows_of_euler
 from support.full_tensor import integrate_top, rotation

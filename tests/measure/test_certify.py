@@ -7,7 +7,7 @@ import msgspec
 import pytest
 from flint import arb
 
-from heavytop.errors import Contradiction, InputError, OutOfReach
+from heavytop import GYROSTAT, Contradiction, HeavyTop, InputError, OutOfReach, State
 from heavytop.exact.cases.delone import DeloneHomoclinic
 from heavytop.exact.cases.ershkov_partial import ErshkovPartial
 from heavytop.exact.cases.euler import Euler
@@ -19,8 +19,6 @@ from heavytop.measure.certify import _digits, agreed_digits, certify
 from heavytop.measure.reference import reference
 from heavytop.measure.scalar import GUARD_BITS
 from heavytop.measure.truth import certified
-from heavytop.top.equations import GYROSTAT
-from heavytop.top.heavy_top import HeavyTop, State
 from support.helpers import VECTORS, start_of, top_of
 
 KNOWN = [DeloneHomoclinic(Fraction(1), Fraction(1)), ErshkovPartial(Fraction(1), Fraction(6), Fraction(1))]

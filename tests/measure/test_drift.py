@@ -11,8 +11,8 @@ import numpy
 import pytest
 from flint import arb
 
+from heavytop import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, HeavyTop, InputError, State, holding, real
 from heavytop.cases import CASES, case
-from heavytop.errors import InputError
 from heavytop.exact.cases.delone import DeloneHomoclinic
 from heavytop.exact.flint.balls import ball, working_precision
 from heavytop.integrate.heyoka.motions import propagate
@@ -23,11 +23,10 @@ from heavytop.measure.scalar import to_ball, to_balls
 from heavytop.measure.scorer import Drift, Scorer, SolutionError
 from heavytop.measure.truth import Truth, closed_form
 from heavytop.multiword.pairs import Pairs
-from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, exact, number, real
+from heavytop.precision import exact, number
 from heavytop.records import Against
-from heavytop.top.equations import SYSTEMS, Parameters, holding, kovalevskaya_yehia
+from heavytop.top.equations import SYSTEMS, Parameters, kovalevskaya_yehia
 from heavytop.top.equations import sretensky as sretensky_integral
-from heavytop.top.heavy_top import HeavyTop, State
 from support.helpers import in_units
 
 TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))

@@ -7,10 +7,8 @@ from fractions import Fraction
 
 import pytest
 
+from heavytop import DOUBLE, HEAVY_TOP, HeavyTop, State
 from heavytop.measure.motion import compute
-from heavytop.precision import DOUBLE
-from heavytop.top.equations import HEAVY_TOP
-from heavytop.top.heavy_top import HeavyTop, State
 
 TIMES = [Fraction(1), Fraction(10)]
 

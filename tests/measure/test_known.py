@@ -6,12 +6,11 @@ from typing import Any
 import pytest
 
 import heavytop as ht
+from heavytop import DOUBLE, QUAD, HeavyTop, State
 from heavytop.cases import CASES
 from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.truth import known_motion
-from heavytop.precision import DOUBLE, QUAD
-from heavytop.top.heavy_top import HeavyTop, State
 from support.helpers import in_units
 from support.in_process import heavytop
 

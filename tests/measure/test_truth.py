@@ -7,7 +7,7 @@ from fractions import Fraction
 import pytest
 from flint import arb
 
-from heavytop.errors import OutOfReach
+from heavytop import DOUBLE, GYROSTAT, QUAD, HeavyTop, OutOfReach, Precision, State, real
 from heavytop.exact.cases.ershkov_partial import ErshkovPartial
 from heavytop.exact.enclosure import run as validated
 from heavytop.exact.enclosure.run import Validated
@@ -18,9 +18,7 @@ from heavytop.integrate.multiword.motions import integrate_to_samples
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure import truth as truths
 from heavytop.measure.truth import ComputedReference, Truth, known_motion, of_rounded, truth
-from heavytop.precision import DOUBLE, QUAD, Precision, exact, number, real
-from heavytop.top.equations import GYROSTAT
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.precision import exact, number
 from support.helpers import in_units
 
 CHAOTIC = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))

@@ -73,10 +73,10 @@ def test_other_arguments_have_other_code(folder: Path) -> None:
     assert len([*folder.iterdir()]) == 2
 
 
-def test_every_flipped_bit_is_noticed(folder: Path) -> None:
+def test_a_flipped_bit_is_noticed_wherever_it_is(folder: Path) -> None:
     file = kept(folder)
     content = file.read_bytes()
-    for place in range(len(content)):
+    for place in (*range(200), *range(200, len(content), 13)):
         damaged = bytearray(content)
         damaged[place] ^= 1 << place % 8
         file.write_bytes(damaged)

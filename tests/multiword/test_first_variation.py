@@ -7,13 +7,12 @@ from random import Random
 import numpy
 import pytest
 
+from heavytop import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, HeavyTop, State
 from heavytop.exact.enclosure import derivatives
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.enclosure.step import Whole, lacking
 from heavytop.multiword.fixed_point.arithmetic import grid_of
 from heavytop.multiword.fixed_point.first_variation import WordColumns
-from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP
-from heavytop.top.heavy_top import HeavyTop, State
 from multiword.test_proven import extreme_centre, rounded
 from support.helpers import moments_of_a_body
 

@@ -5,16 +5,14 @@ from random import Random
 
 import pytest
 
+from heavytop import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, HeavyTop, Outcome, State, real
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import midpoint
 from heavytop.integrate.multiword.motions import propagate_multiword
-from heavytop.integrate.trajectory import Outcome
 from heavytop.multiword.codegen.recurrence import rates
 from heavytop.multiword.integers.integer_series import IntegerMotion, field_of
 from heavytop.multiword.problem import Scaled, Status
-from heavytop.precision import exact, real
-from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.precision import exact
 from support.helpers import random_parameters, vector
 from support.words_helpers import problem
 

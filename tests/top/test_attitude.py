@@ -9,12 +9,11 @@ from typing import Any
 import numpy
 import pytest
 
-from heavytop.errors import InputError
+from heavytop import Attitude, InputError
 from heavytop.exact.flint.balls import FUNCTIONS, ball, working_precision
 from heavytop.precision import cross, dot
 from heavytop.top.attitude import (
     SEQUENCES,
-    Attitude,
     attitude_from_angles,
     euler_of_rows,
     gamma_from_angles,

@@ -7,20 +7,16 @@ from random import Random
 import pytest
 from flint import fmpq_mpoly_ctx
 
-from heavytop.errors import InputError
+from heavytop import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, HeavyTop, InputError, State, holding
 from heavytop.exact.closed_form import orientation, renamed_state, renamed_top
 from heavytop.precision import dot
 from heavytop.top.amplification import rate
 from heavytop.top.equations import (
-    GYROSTAT,
-    HEAVY_GYROSTAT,
-    HEAVY_TOP,
     Parameters,
     area,
     gyrostat,
     heavy_gyrostat,
     heavy_top,
-    holding,
     kovalevskaya_yehia,
     largest,
     square_of_rate,
@@ -28,7 +24,7 @@ from heavytop.top.equations import (
     system,
     system_of,
 )
-from heavytop.top.heavy_top import HeavyTop, State, data_texts, require_physical
+from heavytop.top.heavy_top import data_texts, require_physical
 from support.helpers import fraction, moments, positive, rational, renamed, unit_vector, vector
 
 STARTS = State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))

@@ -5,10 +5,9 @@ from random import Random
 
 import pytest
 
-from heavytop.errors import InputError
+from heavytop import GYROSTAT, HeavyTop, InputError, State
 from heavytop.precision import dot
-from heavytop.top.equations import GYROSTAT
-from heavytop.top.heavy_top import HeavyTop, State, require_physical
+from heavytop.top.heavy_top import require_physical
 from support.helpers import unit_vector, vector
 
 
