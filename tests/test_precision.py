@@ -29,7 +29,7 @@ from heavytop.precision import (
     shown,
 )
 
-FORMATS = [DOUBLE, EXTENDED, QUAD, real(24), real(237), real(1024)]
+FORMATS = [DOUBLE, EXTENDED, QUAD, real(24), real(237), real(1024), real(20000)]
 
 
 @pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
@@ -44,14 +44,6 @@ def test_a_number_is_the_nearest_of_its_format_and_comes_back_exactly(precision)
         assert back == round_to(value, precision.bits)
         assert rounded(back, precision) == back
         assert rounded(exact(native_text(native, precision)), precision) == back
-
-
-def test_twenty_thousand_bits_come_back_exactly() -> None:
-    precision = real(20000)
-    value = round_to(Fraction(1, 3), precision.bits)
-    assert rounded(Fraction(1, 3), precision) == value
-    assert abs(value - Fraction(1, 3)) <= Fraction(1, 2**20001)
-    assert rounded(exact(native_text(number(value, precision), precision)), precision) == value
 
 
 def test_ties_go_to_even() -> None:

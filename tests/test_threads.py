@@ -97,15 +97,34 @@ def carried() -> Any:
     return [(midpoint(x), radius(x)) for x in (*motion.state(F(7, 3), 300), *motion.attitude(F(7, 3), 200))]
 
 
+def ensemble() -> Any:
+    problems = [Problem.of(*some_top(index), DOUBLE) for index in range(20)]
+    return [run.texts() for run in propagate_ensemble(problems, TIMES, threads=2)]
+
+
+MOTIONS = [Euler(*some_top(index, free=True)) for index in range(4)]
+
+
+def series(index: int) -> Any:
+    parts = MOTIONS[index % 4].series(F(1, 2), 2 + index % 3, 100)
+    return [[(midpoint(part[n]), radius(part[n])) for n in range(2 + index % 3)] for part in parts]
+
+
+def words_of_mpmath(index: int) -> Any:
+    """Of a peer with settings of the whole process."""
+    return run_peer("mpmath:odefun", *some_top(index % 2), [F(1, 4)], real((60, 100, 140)[index % 3])).texts()
+
+
 def calls() -> list[Callable[[], Any]]:
     """Calls of every kind; those that share an engine or a lattice are many, and differ in precision."""
-    found: list[Callable[[], Any]] = [carried]
+    found: list[Callable[[], Any]] = [carried, *[ensemble] * 2]
     for index in range(24):
         found += [
             partial(propagated, index, FORMATS[index % 4]),
             partial(referred, index, (20, 300, 50)[index % 3]),
             partial(drifted, index, FORMATS[index % 3]),
         ]
+        found += [partial(series, index), partial(words_of_mpmath, index)][: 2 if index < 6 else 1]
     return [*found, *(partial(stepped, index) for index in range(4))]
 
 
@@ -129,17 +148,6 @@ def test_eight_threads_that_ask_one_enclosure_get_the_balls_of_one() -> None:
     alone = [Validated(top, start).state(time, bits) for time, bits in wanted[:21]]
     for one, other in zip(found, alone, strict=False):
         assert [(midpoint(x), radius(x)) for x in one] == [(midpoint(x), radius(x)) for x in other]
-
-
-@pytest.mark.slow
-def test_series_from_many_threads_are_whole() -> None:
-    motions = [Euler(*some_top(i, free=True)) for i in range(4)]
-
-    def series(index: int) -> list[list[tuple[Fraction, Fraction]]]:
-        parts = motions[index % 4].series(F(1, 2), 2 + index % 3, 100)
-        return [[(midpoint(part[n]), radius(part[n])) for n in range(2 + index % 3)] for part in parts]
-
-    assert in_threads([partial(series, i) for i in range(24)]) == [series(i) for i in range(24)]
 
 
 @pytest.mark.slow
@@ -180,17 +188,6 @@ def test_an_observer_may_wait_for_a_thread_that_evaluates() -> None:
     propagate_ensemble([Problem.of(*some_top(1), DOUBLE)] * 2, TIMES[:1], observer=lambda _, *rest: observer(*rest))
 
 
-@pytest.mark.slow
-def test_an_ensemble_beside_references_and_drifts_changes_none_of_them() -> None:
-    problems = [Problem.of(*some_top(i), DOUBLE) for i in range(20)]
-
-    def ensemble() -> Any:
-        return [run.texts() for run in propagate_ensemble(problems, TIMES, threads=2)]
-
-    wanted = [ensemble, *(partial(referred, i, 60) for i in range(8)), *(partial(drifted, i, QUAD) for i in range(4))]
-    assert in_threads(wanted, 4) == [each() for each in wanted]
-
-
 @pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt])
 def test_a_run_that_raises_gives_its_engine_back(error: type[BaseException]) -> None:
     def observer(*_: object) -> None:
@@ -204,15 +201,6 @@ def test_a_run_that_raises_gives_its_engine_back(error: type[BaseException]) -> 
             propagate(*some_top(2), TIMES, DOUBLE, observer=observer)
     assert {id(engine) for engine in tool.spare} == spare
     assert propagated(1, DOUBLE) == before
-
-
-@pytest.mark.slow
-def test_peers_with_settings_of_the_whole_process_are_right_in_threads() -> None:
-    pytest.importorskip("mpmath")
-    wanted = [
-        partial(run_peer, "mpmath:odefun", *some_top(i % 2), [F(1, 4)], real((60, 100, 140)[i % 3])) for i in range(6)
-    ]
-    assert [run.texts() for run in in_threads(wanted, 4)] == [each().texts() for each in wanted]
 
 
 def set_and_leave(rng: random.Random) -> None:

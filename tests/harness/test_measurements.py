@@ -86,7 +86,7 @@ def test_a_run_that_fails_is_a_row_with_its_outcome(monkeypatch: pytest.MonkeyPa
     assert row.outcome == "non_finite"
     assert row.finite is False
     assert row.time_reached == "0"
-    assert {metric.value for metric in row.metrics.values()} == {"missing"}
+    assert {(metric.value, metric.band) for metric in row.metrics.values()} == {("missing", None)}
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ from pathlib import Path
 from heavytop.features.kinds import KINDS
 from heavytop.records import SCHEMA, Report
 from heavytop.report.render.export import to_json, to_markdown
-from support import in_process
 from support.report_helpers import claim_rows
 from support.reports import store
 from support.small_reports import error, row
@@ -54,13 +53,3 @@ def test_every_row_of_a_markdown_table_has_the_cells_of_its_head() -> None:
     assert len(tables) >= 5
     for table in tables:
         assert len({len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}) == 1
-
-
-def test_show_prints_and_writes_them(tmp_path: Path) -> None:
-    report = Path(__file__).parents[2] / "results" / "long"
-    done = in_process.heavytop("show", str(report), "--json", cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert json.loads(done.stdout)["plan"]["name"] == "long"
-    done = in_process.heavytop("show", str(report), "--markdown", "report.md", cwd=tmp_path)
-    assert (done.returncode, done.stdout) == (0, "report.md\n")
-    assert (tmp_path / "report.md").read_text("utf-8").startswith("### Plan long: 25 measurements")

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from heavytop.errors import InputError
 from heavytop.features.kinds import KINDS
 from heavytop.integrate.registry import is_third_party
 from heavytop.measure.scalar import RELATIVE
@@ -19,7 +18,6 @@ from heavytop.report.document.kind import document
 from heavytop.report.document.svg import apart, decades, finish, new_axes
 from heavytop.report.render import plots
 from heavytop.report.render.page import MOST_ROWS, digits_headline, digits_until, laws_headline
-from support import in_process
 from support.report_helpers import HOSTILE, TIMES, claim_rows, error, full_report, power, row, work
 from support.reports import compare, html, replace, store
 
@@ -312,26 +310,6 @@ def test_how_to_reproduce_names_the_plan_only_where_it_is_built_in() -> None:
     assert html.commands(report)[0] == f"git checkout {'0' * 40}"
     unknown = replace(report, environment={"packages": {"heavytop": "0.1.0"}, "commit": None})
     assert html.commands(unknown)[0] == "# heavytop 0.1.0"
-
-
-@pytest.mark.usefixtures("undrawn")
-def test_a_page_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="cannot be written"):
-        html.write_report(full_report(), tmp_path / "none" / "page.html")
-    assert not list(tmp_path.iterdir())
-
-
-def test_show_writes_a_page(tmp_path: Path) -> None:
-    report = Report(SCHEMA, {"name": "test"}, {}, [row(), row(case="lagrange")])
-    (tmp_path / "report").mkdir()
-    store.write(report, tmp_path / "report")
-    done = in_process.heavytop("show", "report", "--html", "page.html", cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout == "page.html\n"
-    assert Page(tmp_path / "page.html").all("svg")
-    refused = in_process.heavytop("show", "report", "--html", "no/page.html", cwd=tmp_path)
-    assert refused.returncode == 2
-    assert "Give a file in a writable folder" in refused.stderr
 
 
 def test_every_number_of_the_results_is_in_the_page(pages: dict[str, Page]) -> None:

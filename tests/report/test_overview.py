@@ -4,27 +4,14 @@ from io import StringIO
 
 from rich.console import Console
 
-from heavytop.records import SCHEMA, Metric, Report
+from heavytop.records import SCHEMA, Metric, Report, Row
 from heavytop.report.render.text import worst
-from support.reports import Row
+from support import small_reports
 
 
 def row(index: int, value: str, log10: float | None, outcome: str = "success") -> Row:
     metrics = {"drift_energy_max": Metric(value, log10), "count": Metric("7", 0.845098, "value")}
-    return Row(
-        case=f"top[{index}]",
-        system="heavy_top",
-        integrator="heyoka",
-        precision="double",
-        bits=53,
-        outcome=outcome,
-        horizon="1",
-        time_reached="1",
-        steps=3,
-        finite=True,
-        metrics=metrics,
-        measure="drift",
-    )
+    return small_reports.row(case=f"top[{index}]", outcome=outcome, metrics=metrics)
 
 
 def shown(rows) -> str:

@@ -10,48 +10,23 @@ from heavytop.errors import InputError
 from heavytop.records import Data, Law, Metric
 from heavytop.report.store import parquet
 from heavytop.report.store.parquet import COLUMNS, check_name, write
-from support.reports import Row
+from support.small_reports import row
 
 pytest.importorskip("pyarrow")
 PLAN = {"name": "p", "sha256": "0" * 64}
-SAME = {
-    "case": "euler",
-    "system": "heavy_top",
-    "integrator": "heyoka",
-    "precision": "real:3400",
-    "bits": 3400,
-    "outcome": "success",
-    "horizon": "10",
-    "time_reached": "10",
-    "steps": 7,
-    "finite": True,
-    "measure": "drift",
-    "measured": "computed: heyoka",
-    "against": "its own first integrals",
+REAL = {"precision": "real:3400", "bits": 3400}
+TOP = Data(("3", "2", "1"), "1e-400", ("0", "0", "1/3"), ("1/10", "0", "1e400"), ("0", "0", "-1"))
+METRICS = {
+    "drift_energy_max": Metric("1.25E-997", -996.90309, band=0.25),
+    "solution_error_max": Metric("unresolved", None, bound="1E-1000"),
+    "solution_parts_at": Metric("never", None, "duration"),
 }
+LAWS = {"energy": Law("t^0.5", 63, 0.497, 0.46, 0.53, "1", "1000", "1e-19", None)}
 ROWS = [
-    Row(
-        **SAME,
-        metrics={
-            "drift_energy_max": Metric("1.25E-997", -996.90309, band=0.25),
-            "solution_error_max": Metric("unresolved", None, bound="1E-1000"),
-            "solution_parts_at": Metric("never", None, "duration"),
-        },
-    ),
-    Row(
-        **SAME | {"measure": "growth", "starts": 64},
-        metrics={},
-        laws={"energy": Law("t^0.5", 63, 0.497, 0.46, 0.53, "1", "1000", "1e-19", None)},
-    ),
-    Row(
-        **SAME
-        | {
-            "case": "top",
-            "data": Data(("3", "2", "1"), "1e-400", ("0", "0", "1/3"), ("1/10", "0", "1e400"), ("0", "0", "-1")),
-        },
-        metrics={},
-    ),
-    Row(**SAME | {"case": "generic", "outcome": "time_limit", "time_reached": "3", "finite": False}, metrics={}),
+    row(**REAL, metrics=METRICS),
+    row(**REAL, measure="growth", starts=64, metrics={}, laws=LAWS),
+    row(**REAL, case="top", data=TOP, metrics={}),
+    row(**REAL, case="generic", outcome="time_limit", time_reached="3", finite=False, metrics={}),
 ]
 
 
@@ -153,20 +128,11 @@ def test_the_top_and_the_start_stand_beside_every_number(file: Path) -> None:
     import pandas
 
     table = pandas.read_parquet(file)
-    (row,) = table[table.case == "top"].to_dict("records")
-    assert [row[f"inertia{i}"] for i in (1, 2, 3)] == [3.0, 2.0, 1.0]
-    assert (row["weight"], row["centre3"], row["omega1"], row["omega3"], row["gamma3"]) == (
-        0.0,
-        1 / 3,
-        0.1,
-        float("inf"),
-        -1,
-    )
-    assert (row["weight_exact"], row["centre_exact"], row["omega_exact"]) == ("1e-400", "0,0,1/3", "1/10,0,1e400")
+    (top,) = table[table.case == "top"].to_dict("records")
+    assert [top[f"inertia{i}"] for i in (1, 2, 3)] == [3.0, 2.0, 1.0]
+    assert [top[name] for name in ("weight", "centre3", "omega1", "gamma3")] == [0.0, 1 / 3, 0.1, -1]
+    assert top["omega3"] == float("inf")
+    assert (top["weight_exact"], top["centre_exact"], top["omega_exact"]) == ("1e-400", "0,0,1/3", "1/10,0,1e400")
     assert table[table.case == "euler"][["inertia1", "gamma_exact"]].isna().all(axis=None)
-    floats = [
-        name
-        for name, kind in COLUMNS.items()
-        if name[:-1] in ("inertia", "centre", "omega", "gamma") or name == "weight"
-    ]
-    assert len(floats) == 13
+    vectors = ("inertia", "centre", "omega", "gamma")
+    assert len([name for name in COLUMNS if name[:-1] in vectors or name == "weight"]) == 13

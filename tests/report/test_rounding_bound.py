@@ -26,7 +26,7 @@ from heavytop.report.compare.noise import (
 from heavytop.top.amplification import FOLLOWED, amplification
 from heavytop.top.equations import HEAVY_TOP, Parameters
 from support.reports import compare, replace
-from support.small_reports import error, judged, report, row
+from support.small_reports import all_judged, error, judged, report, row
 
 FREE = Data(("4", "2", "1"), "0", ("0", "0", "0"), ("3", "1/2", "1/3"), ("3/5", "0", "4/5"))
 UPRIGHT = Data(("1", "1", "1/2"), "1", ("0", "0", "1"), ("0", "0", "0"), ("0", "0", "1"))
@@ -130,22 +130,19 @@ def one(value: str, band: float | None, name: str = "solution_error_gamma_max", 
 
 def test_a_baseline_whose_reruns_part_excuses_nothing_that_rounding_does_not_explain() -> None:
     wide = one("1.6e-14", 7.1)
-    assert judged(wide, one("1.3e-6", 0.1))[0] == "worse"
-    assert judged(wide, one("1.3e-6", 7.1))[0] == "worse"
+    assert all_judged(wide, one("1.3e-6", 0.1), one("1.3e-6", 7.1)) == ["worse", "worse"]
     assert judged(wide, one("1e-8", 0.1), rule=(Rule(limit="1e-9"),)) == ("worse", "above its limit")
     assert judged(wide, wide)[0] == "same"
 
 
 def test_a_candidate_whose_reruns_part_is_worse_where_it_reaches_further() -> None:
     assert judged(one("1.6e-14", 0.3), one("1.6e-14", 7.1)) == ("worse", "noise: 7.1 decades, not 0.3")
-    assert judged(one("1e-3", 0.0), one("1e-14", 7.1))[0] == "same"
-    assert judged(one("1e-3", 0.0), one("1e-14", 4.0))[0] == "better"
+    assert all_judged(one("1e-3", 0.0), one("1e-14", 7.1), one("1e-14", 4.0)) == ["same", "better"]
 
 
 def test_reruns_within_what_step_control_does_are_reproducible_and_excuse_no_more() -> None:
     # 1.2 decades apart, at an error far above rounding
-    assert judged(one("1e-6", 0.848), one("1e-6", 0.848))[0] == "same"
-    assert judged(one("1e-6", 0.848), one("1.58e-5", 0.848))[0] == "same"
+    assert all_judged(one("1e-6", 0.848), one("1e-6", 0.848), one("1.58e-5", 0.848)) == ["same", "same"]
     assert judged(one("1e-6", 0.848), one("1.59e-5", 0.848))[0] == "worse"
     # below the bound of rounding, about 1.9e-10 here, all of the band is allowed
     assert judged(one("1e-14", 0.848), one("1e-12", 0.848))[0] == "same"
@@ -175,8 +172,7 @@ def third_party(value: str, name: str = "drift_energy_max", **changes) -> Row:
 
 def test_a_loss_that_a_policy_gives_is_that_of_truncation_too() -> None:
     for given in ({"loss_bits": 2}, {"loss_digits": "0.6"}, {"rule": (Rule(metric="drift_*", loss_bits=2),)}):
-        assert judged(third_party("1e-8"), third_party("3e-8"), **given)[0] == "same"
-        assert judged(third_party("1e-8"), third_party("5e-8"), **given)[0] == "worse"
+        assert all_judged(third_party("1e-8"), third_party("3e-8"), third_party("5e-8"), **given) == ["same", "worse"]
     assert judged(third_party("1e-8"), third_party("1.07e-8"), loss_bits="0.05")[0] == "worse"
 
 
@@ -222,11 +218,9 @@ def test_an_escape_whose_reruns_part_excuses_nothing() -> None:
         return row(metrics={"break_away_time": metric}, **common)
 
     assert judged(at("30", 0.02), at("29", 0.02))[0] == "same"
-    assert judged(at("30", 0.2), at("30", 0.2))[0] == "same"
-    assert judged(at("30", 0.2), at("15", 0.2))[0] == "worse"
+    assert all_judged(at("30", 0.2), at("30", 0.2), at("15", 0.2)) == ["same", "worse"]
     # within twice its band, but by more than noise moves an escape
-    assert judged(at("30", 0.07), at("20.9", 0.07))[0] == "same"
-    assert judged(at("30", 0.07), at("20.6", 0.07))[0] == "worse"
+    assert all_judged(at("30", 0.07), at("20.9", 0.07), at("20.6", 0.07)) == ["same", "worse"]
     # later, and noisier by as much as it is longer
     assert judged(at("10", 0.0001), at("30", 0.02))[0] == "better"
 
@@ -275,8 +269,7 @@ def test_the_series_of_an_ensemble_may_move_by_no_more_than_its_metrics() -> Non
         return one("1e-5", 5.0, measure="growth", starts=16, series=series)
 
     # 2 · 0.602 · √2 decades
-    assert judged(sampled("1e-9"), sampled("4.9e-8"))[0] == "same"
-    assert judged(sampled("1e-9"), sampled("5.1e-8"))[0] == "worse"
+    assert all_judged(sampled("1e-9"), sampled("4.9e-8"), sampled("5.1e-8")) == ["same", "worse"]
 
 
 def test_where_all_digits_are_lost_a_narrow_band_is_chance() -> None:

@@ -12,7 +12,7 @@ from support import report_helpers
 from support.report_helpers import error
 from support.reports import compare, replace
 
-__all__ = ["error", "judged", "report", "row", "verdicts"]
+__all__ = ["all_judged", "error", "judged", "report", "row", "verdicts"]
 
 
 def row(**changes) -> Row:
@@ -45,3 +45,8 @@ def verdicts(old: Row, new: Row, policy: Policy | None = None, **options: Any) -
     """The verdict on each metric, law and series of the second of two rows."""
     found = compare(report(old), report(new), policy or Policy(**options)).findings
     return {finding.metric: finding.verdict.value for finding in found}
+
+
+def all_judged(old: Row, *news: Row, **policy: Any) -> list[str]:
+    """The verdicts on rows, each compared with the same one."""
+    return [judged(old, new, **policy)[0] for new in news]
