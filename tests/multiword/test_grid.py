@@ -1,5 +1,7 @@
 """Fixed grids: products against exact numbers, every overflow caught, the same bits on every processor."""
 
+import math
+from collections.abc import Iterator
 from fractions import Fraction
 from random import Random
 
@@ -38,11 +40,6 @@ def random_problem(random: Random) -> Scaled:
     gamma = [Fraction(random.randint(-2300, 2300), 4096) for _ in range(3)]
     p = Parameters(moments, weights, Fraction(0))
     return Scaled.of(HEAVY_TOP, p, (*omega, *gamma), bounded=True)
-
-
-def error_in_ulp(run: Fixed, known: tuple[Fraction, ...], span: Fraction) -> float:
-    found = run.sample(span)
-    return float(max(abs(a - b) for a, b in zip(found, known, strict=True)) * 2**run.grid.total)
 
 
 def test_words_hold_numbers_to_half_a_unit_and_add_up_exactly() -> None:
@@ -124,39 +121,35 @@ def test_sums_of_products_are_exact_but_for_the_last_level_or_are_caught(grid: G
     assert caught < 15 or grid.bits == 51 or kind == "largest"
 
 
+def beside_finer(grid: Grid, finer: Grid, count: int) -> Iterator[tuple[Fixed, Status, float]]:
+    """Runs of random tops, how they end, and their errors in ulp, infinite without a sample."""
+    random, span = Random(grid.bits * grid.words), Fraction(HORIZON)
+    for _ in range(count):
+        scaled = random_problem(random)
+        known, run = (Fixed(scaled, each, True) for each in (finer, grid))
+        assert known.advance(span, 10**4) is Status.OK
+        status, truth = run.advance(span, 10**4), known.sample(span)
+        found = run.sample(span)
+        off = max(abs(a - b) for a, b in zip(found, truth, strict=True)) if found else math.inf
+        yield run, status, float(off * 2**grid.total)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("words", "count"), [(3, 20), (6, 8)])
 def test_at_the_sizes_in_use_no_check_fires_and_all_is_right(words: int, count: int) -> None:
-    random, grid, span = Random(words), grid_of(words), Fraction(HORIZON)
-    for _ in range(count):
-        scaled = random_problem(random)
-        known = Fixed(scaled, grid_of(2 * words), True)
-        run = Fixed(scaled, grid, True)
-        for each in (known, run):
-            assert each.advance(span, 10**4) is Status.OK
-        truth = known.sample(span)
-        assert run.redone == 0
-        assert error_in_ulp(run, truth, span) < 1e4
+    for run, status, off in beside_finer(grid_of(words), grid_of(2 * words), count):
+        assert (status, run.redone) == (Status.OK, 0)
+        assert off < 1e4
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("bits", [48, 50, 52])
 def test_words_that_are_too_wide_give_no_wrong_number(bits: int) -> None:
     """Each run is right, if need be with shorter steps, or its outcome says that it is not."""
-    random, grid, span = Random(bits), Grid(3, bits), Fraction(HORIZON)
-    redone = 0
-    for _ in range(20):
-        scaled = random_problem(random)
-        known, run = Fixed(scaled, grid_of(6), True), Fixed(scaled, grid, True)
-        assert known.advance(span, 10**4) is Status.OK
-        truth = known.sample(span)
-        status = run.advance(span, 10**4)
-        redone += run.redone
-        if status is Status.OK and run.sample(span) is not None:
-            assert error_in_ulp(run, truth, span) < WRONG_ULP
-        else:
-            assert status in (Status.CAPACITY, Status.OK)
-    assert redone > 0 or bits < 50
+    runs = [*beside_finer(Grid(3, bits), grid_of(6), 20)]
+    assert {status for _, status, _ in runs} <= {Status.OK, Status.CAPACITY}
+    assert all(off < WRONG_ULP or off == math.inf for _, status, off in runs if status is Status.OK)
+    assert sum(run.redone for run, _, _ in runs) > 0 or bits < 50
 
 
 @pytest.mark.slow
@@ -164,16 +157,7 @@ def test_without_the_check_some_would_be_wrong(monkeypatch: pytest.MonkeyPatch) 
     """The check is what makes them right: with the sums unwatched, words of 51 bits give wrong numbers."""
     monkeypatch.setattr(arithmetic.Accumulator, "look", lambda self, k: None)
     monkeypatch.setattr(fixed_point_run, "machine", once(build))
-    random, grid, span, wrong = Random(51), Grid(3, 51), Fraction(HORIZON), 0
-    for _ in range(15):
-        scaled = random_problem(random)
-        known, run = Fixed(scaled, grid_of(6), True), Fixed(scaled, grid, True)
-        for each in (known, run):
-            each.advance(span, 10**4)
-        truth = known.sample(span)
-        found = run.sample(span)
-        wrong += truth is None or found is None or error_in_ulp(run, truth, span) > WRONG_ULP
-    assert wrong
+    assert any(off > WRONG_ULP for _, _, off in beside_finer(Grid(3, 51), grid_of(6), 15))
 
 
 def test_steps_grow_and_shrink_with_the_motion() -> None:
