@@ -16,14 +16,7 @@ from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import midpoint
 from heavytop.precision import dot
 from heavytop.top.heavy_top import HeavyTop, State
-from support.proofs import (
-    AsRounded,
-    assert_algebraic_solves,
-    assert_attitude,
-    assert_solves,
-    positive,
-    rational,
-)
+from support.proofs import AsRounded, assert_algebraic_solves, assert_attitude, assert_solves, positive, rational
 
 F = Fraction
 # (tangent u, S - b, w, z/x) with rational S and axes: found by a search over small fractions

@@ -8,12 +8,7 @@ from flint import acb, arb
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.elliptic.quartic import QuarticMotion
-from heavytop.exact.elliptic.weierstrass import (
-    DegenerateLattice,
-    Lattice,
-    _cubic_roots,
-    from_invariants,
-)
+from heavytop.exact.elliptic.weierstrass import DegenerateLattice, Lattice, _cubic_roots, from_invariants
 from heavytop.exact.flint.balls import ball, radius, working_precision
 
 NARROW = Fraction(1, 10**35)

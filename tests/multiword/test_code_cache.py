@@ -11,7 +11,8 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.multiword.codegen import code_cache
-from heavytop.multiword.codegen.machine_code import POINTER, Machine, compiled, function, ir, once, pointer
+from heavytop.multiword.codegen.machine_code import POINTER, Machine, once, pointer
+from support.words_helpers import machine_of
 
 CHANGES: dict[str, Callable[[bytes], bytes]] = {
     "empty": lambda _: b"",
@@ -33,12 +34,12 @@ def thrice(calls: list[int]) -> Callable[[int], Machine]:
 
     def make(factor: int) -> Machine:
         calls.append(factor)
-        module = ir.Module("test")
-        _, code = function(module, "multiply", ir.VoidType(), [POINTER])
-        (vector,) = code.arguments
-        code.store(code.load(vector, 0) * float(factor), vector, 0)
-        code.builder.ret_void()
-        return compiled(module)
+
+        def write(_, code) -> None:
+            (vector,) = code.arguments
+            code.store(code.load(vector, 0) * float(factor), vector, 0)
+
+        return machine_of(write, [POINTER])
 
     return once(make)
 
@@ -47,7 +48,7 @@ def require_right(machine: Machine) -> None:
     room = numpy.zeros(16)
     vector = room[(-room.ctypes.data % 64) // 8 :][:8]
     vector[:] = range(8)
-    machine.functions["multiply"](pointer(vector))
+    machine.functions["f"](pointer(vector))
     assert [*vector] == [3.0 * k for k in range(8)]
 
 
@@ -136,4 +137,4 @@ def test_the_folder_does_not_grow_without_end(folder: Path, monkeypatch: pytest.
 
 def test_signatures_come_back(folder: Path) -> None:
     first = thrice([])(3)
-    assert thrice([])(3).signatures == first.signatures == {"multiply": ["void", "double*"]}
+    assert thrice([])(3).signatures == first.signatures == {"f": ["void", "double*"]}

@@ -6,19 +6,8 @@ from typing import Any
 
 import numpy
 import pytest
-from llvmlite import ir
 
-from heavytop.multiword.codegen.machine_code import (
-    INT,
-    INT_POINTER,
-    LANES,
-    POINTER,
-    Machine,
-    compiled,
-    doubles,
-    function,
-    pointer,
-)
+from heavytop.multiword.codegen.machine_code import INT, INT_POINTER, LANES, POINTER, Machine, doubles, pointer
 from heavytop.multiword.fixed_point import products
 from heavytop.multiword.fixed_point.arithmetic import Grid, exact, grid_of
 from heavytop.multiword.fixed_point.fixed_point_run import Fixed
@@ -27,18 +16,17 @@ from heavytop.multiword.fixed_point.steps import rows_of, size_of
 from heavytop.multiword.integers.integer_series import IntegerMotion
 from heavytop.multiword.problem import Scaled, Status
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
+from support.words_helpers import machine_of
 
 LARGEST = 2**23 + 4
 
 
 def sums_code(wide: bool) -> Machine:
-    """sums(left, right, where, orders, levels, sums), callable from here."""
-    module = ir.Module("sums")
-    (written,) = DigitRows.write_kernels(module, grid_of(8), 0, wide)
-    _, code = function(module, "sums", ir.VoidType(), [POINTER, POINTER, INT_POINTER, INT, INT, POINTER])
-    code.call(written, code.arguments)
-    code.builder.ret_void()
-    return compiled(module)
+    """f(left, right, where, orders, levels, sums)."""
+    return machine_of(
+        lambda module, code: code.call(DigitRows.write_kernels(module, grid_of(8), 0, wide)[0], code.arguments),
+        [POINTER, POINTER, INT_POINTER, INT, INT, POINTER],
+    )
 
 
 def known_sums(rows: numpy.ndarray, row: int, orders: int, levels: int) -> list[int]:
@@ -58,7 +46,7 @@ def sums_of(machine: Machine, table: numpy.ndarray, row: int, orders: int, level
     """The sums of a table of digits with itself reversed, each level a row."""
     sums, where = doubles(LANES * (levels + 1)), (LANES * row * numpy.arange(orders)).astype(numpy.int64)
     arrays = table.ravel(), table[row * (orders - 1) :].ravel(), where
-    machine.functions["sums"](*map(pointer, arrays), orders, levels, pointer(sums))
+    machine.functions["f"](*map(pointer, arrays), orders, levels, pointer(sums))
     return sums.reshape(-1, LANES)
 
 
@@ -116,26 +104,25 @@ def test_with_more_products_in_a_sum_some_would_be_wrong(times: int, monkeypatch
     assert (found[0] == known[0]) == (times == 1)
 
 
-def conversion(grid: Grid) -> Machine:
-    """digits(words, found) and words(sums, found), callable from here."""
-    module = ir.Module("conversion")
-    count = digits_of(grid)
-    for name, length in (("digits", grid.words), ("words", count + 1)):
-        _, code = function(module, name, ir.VoidType(), [POINTER, POINTER])
+def conversion(grid: Grid, name: str, length: int) -> Machine:
+    """f(words, found) for the digits of words, or f(sums, found) for the words of sums."""
+
+    def write(_, code) -> None:
         given, to = code.arguments
         rows = DigitRows(code, grid, 1, 0, *[code.null] * 4, [])
         values = [code.load(given, LANES * k) for k in range(length)]
-        for k, value in enumerate(rows._digits(values) if name == "digits" else rows._words(values)):
+        for k, value in enumerate(getattr(rows, name)(values)):
             code.store(value, to, LANES * k)
-        code.builder.ret_void()
-    return compiled(module)
+
+    return machine_of(write, [POINTER, POINTER])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("words", [5, 13, 24])
 def test_digits_are_those_of_the_words_and_sums_become_words(words: int) -> None:
     grid, random = grid_of(words), Random(words)
-    count, machine = digits_of(grid), conversion(grid)
+    count = digits_of(grid)
+    of_words, of_sums = conversion(grid, "_digits", words), conversion(grid, "_words", count + 1)
     last = Fraction(2) ** (products._HEAD - products.BITS * count)
     assert last <= Fraction(2) ** (-grid.total - products._BEHIND)
     for _ in range(40):
@@ -145,7 +132,7 @@ def test_digits_are_those_of_the_words_and_sums_become_words(words: int) -> None
             given[LANES * k : LANES * (k + 1)] = [
                 random.choice([-most, most, random.randint(-most, most), 1, 0]) * grid.unit(k) for _ in range(LANES)
             ]
-        machine.functions["digits"](pointer(given), pointer(found))
+        of_words.functions["f"](pointer(given), pointer(found))
         assert numpy.abs(found).max() <= LARGEST
         assert (found == numpy.round(found)).all()
         for lane in range(LANES):
@@ -157,7 +144,7 @@ def test_digits_are_those_of_the_words_and_sums_become_words(words: int) -> None
         for k in range(1 + count):
             most = 2**products.SUM_BITS if k > 3 else 2**10
             given[LANES * k : LANES * (k + 1)] = [random.randint(-most, most) for _ in range(LANES)]
-        machine.functions["words"](pointer(given), pointer(found))
+        of_sums.functions["f"](pointer(given), pointer(found))
         for lane in range(LANES):
             value = sum(int(s) * unit * 2 ** (products.BITS * (count - k)) for k, s in enumerate(given[lane::8]))
             assert abs(value - exact(found[lane::8])) * 2 ** (grid.total + 4) <= 1

@@ -6,23 +6,15 @@ from random import Random
 
 import numpy
 import pytest
-from llvmlite import ir
 
-from heavytop.multiword.codegen.machine_code import (
-    DOUBLE,
-    POINTER,
-    compiled,
-    doubles,
-    function,
-    pointer,
-)
+from heavytop.multiword.codegen.machine_code import DOUBLE, POINTER, doubles, pointer
 from heavytop.multiword.double_double import steps as dd
 from heavytop.multiword.double_double.arithmetic import by_constant, log2, power_of_two, split, split_constant
 from heavytop.multiword.double_double.double_double_run import Floating, OrderSchedule
 from heavytop.multiword.double_double.eight_lane_run import Eight
 from heavytop.multiword.problem import Scaled, Status
 from heavytop.top.equations import HEAVY_TOP, Parameters
-from support.words_helpers import problem
+from support.words_helpers import machine_of, problem
 
 FINEST, COARSE = Fraction(1, 2**105), Fraction(1, 10**16)
 LADDER = OrderSchedule.of(FINEST)
@@ -62,15 +54,15 @@ def test_simple_fractions_round_without_a_bias() -> None:
 @pytest.mark.slow
 def test_a_constant_times_a_number_has_the_nearest_high_word() -> None:
     """Not the nearest to the product with the constant's first word: its remainders are not symmetric about 0."""
-    module = ir.Module("products")
-    _, code = function(module, "product", ir.VoidType(), [POINTER, POINTER, POINTER])
-    given, factor, result = code.arguments
-    constant, number = ([code.load(base, 8 * k) for k in range(3)] for base in (given, factor))
-    words = by_constant(code, (constant[0], constant[1], constant[2]), (number[0], number[1]))
-    for k, word in enumerate(words):
-        code.store(word, result, 8 * k)
-    code.builder.ret_void()
-    machine = compiled(module)
+
+    def write(_, code) -> None:
+        given, factor, result = code.arguments
+        constant, number = ([code.load(base, 8 * k) for k in range(3)] for base in (given, factor))
+        words = by_constant(code, (constant[0], constant[1], constant[2]), (number[0], number[1]))
+        for k, word in enumerate(words):
+            code.store(word, result, 8 * k)
+
+    machine = machine_of(write, [POINTER] * 3)
     random, unit = Random(1), 2.0**-53
     for c in (Fraction(text) for text in ("2/5", "-3/20", "5/6", "1/3", "-3/7", "4/9", "17/21", "1/2")):
         constants, found = doubles(24), doubles(16)
@@ -80,7 +72,7 @@ def test_a_constant_times_a_number_has_the_nearest_high_word() -> None:
             numbers = doubles(24)
             numbers[:8] = [random.uniform(-1, 1) for _ in range(8)]
             numbers[8:16] = [random.uniform(-unit, unit) * abs(high) / 2 for high in numbers[:8]]
-            machine.functions["product"](pointer(constants), pointer(numbers), pointer(found))
+            machine.functions["f"](pointer(constants), pointer(numbers), pointer(found))
             for a, low, high, rest in zip(numbers[:8], numbers[8:16], found[:8], found[8:], strict=True):
                 whole = c * (Fraction(a) + Fraction(low))
                 assert high == float(c * Fraction(a))
@@ -126,20 +118,10 @@ def test_a_state_that_is_not_finite_stops_the_run() -> None:
     assert run.time == 0
 
 
-def elementary(name: str):
-    """log2 or power_of_two as a function of Python."""
-    module = ir.Module(name)
-    _, code = function(module, "f", DOUBLE, [DOUBLE])
-    (given,) = code.arguments
-    code.builder.ret(log2(given) if name == "log2" else power_of_two(code, given, 6, 10))
-    machine = compiled(module)
-    return machine, machine.functions["f"]
-
-
 def test_logarithm_and_power_are_good_to_a_thousandth() -> None:
-    keep, log = elementary("log2")
-    also, power = elementary("power")
-    assert keep.seconds > 0 < also.seconds
+    logarithm = machine_of(lambda _, code: log2(code.arguments[0]), [DOUBLE], DOUBLE)
+    exponential = machine_of(lambda _, code: power_of_two(code, code.arguments[0], 6, 10), [DOUBLE], DOUBLE)
+    log, power = logarithm.functions["f"], exponential.functions["f"]
     for x in numpy.geomspace(1e-300, 1e300, 4001):
         assert abs(log(x) - math.log2(x)) < 1e-3
     for y in numpy.linspace(-890, 5.99, 4001):

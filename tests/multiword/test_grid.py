@@ -7,18 +7,8 @@ from random import Random
 
 import numpy
 import pytest
-from llvmlite import ir
 
-from heavytop.multiword.codegen.machine_code import (
-    INT,
-    POINTER,
-    Machine,
-    compiled,
-    doubles,
-    function,
-    once,
-    pointer,
-)
+from heavytop.multiword.codegen.machine_code import INT, POINTER, Machine, doubles, once, pointer
 from heavytop.multiword.fixed_point import arithmetic, fixed_point_run, steps
 from heavytop.multiword.fixed_point.arithmetic import EXPONENT_BITS, Grid, digits, exact, grid_for, grid_of
 from heavytop.multiword.fixed_point.fixed_point_run import Fixed
@@ -26,7 +16,7 @@ from heavytop.multiword.fixed_point.steps import build, sample_row
 from heavytop.multiword.problem import Scaled, Status
 from heavytop.top.equations import HEAVY_TOP, Parameters
 from support.helpers import moments_of_a_body
-from support.words_helpers import problem
+from support.words_helpers import machine_of, problem
 
 HORIZON = 2
 WRONG_ULP = 1e6
@@ -65,13 +55,11 @@ def test_the_smallest_grid_that_has_the_bits_is_taken(bits: int, words: int, wid
 
 
 def product_code(grid: Grid) -> Machine:
-    """products(left, right, count, sums, seen) in all K levels, callable from here."""
-    module = ir.Module("products")
-    written = arithmetic.write_kernels(module, grid, 8 * grid.words)[-1]
-    _, code = function(module, "products", ir.VoidType(), [POINTER, POINTER, INT, POINTER, POINTER])
-    code.call(written, code.arguments)
-    code.builder.ret_void()
-    return compiled(module)
+    """f(left, right, count, sums, seen) in all K levels."""
+    return machine_of(
+        lambda module, code: code.call(arithmetic.write_kernels(module, grid, 8 * grid.words)[-1], code.arguments),
+        [POINTER, POINTER, INT, POINTER, POINTER],
+    )
 
 
 @pytest.mark.slow
@@ -106,7 +94,7 @@ def test_sums_of_products_are_exact_but_for_the_last_level_or_are_caught(grid: G
         for k in range(grid.words):
             sums[8 * k : 8 * k + 8] = grid.centre(k)
         last = 8 * grid.words * (count - 1)
-        machine.functions["products"](pointer(rows[0]), pointer(rows[1][last:]), count, pointer(sums), pointer(seen))
+        machine.functions["f"](pointer(rows[0]), pointer(rows[1][last:]), count, pointer(sums), pointer(seen))
         if numpy.bitwise_or.reduce(seen.view(numpy.int64)) & EXPONENT_BITS:
             caught += 1
             continue

@@ -6,16 +6,8 @@ import numpy
 import pytest
 from llvmlite import ir
 
-from heavytop.multiword.codegen.machine_code import (
-    DOUBLE,
-    INT,
-    POINTER,
-    Operand,
-    compiled,
-    doubles,
-    function,
-    pointer,
-)
+from heavytop.multiword.codegen.machine_code import DOUBLE, INT, POINTER, Operand, doubles, function, pointer
+from support.words_helpers import machine_of
 
 PAIRS = [(1.5, -2.25), (-0.1, 3.0), (7.0, 7.0), (1e150, 1e-150), (5.0, 0.3)]
 WHOLE = [(7, 3), (-9, 4), (12, 12), (1 << 40, 5)]
@@ -34,16 +26,14 @@ ON_INTEGERS = {
 
 def value_of(formula, kind: ir.Type, a, b):
     """What a formula gives in machine code, of two doubles or integers."""
-    module = ir.Module("formula")
-    _, code = function(module, "f", kind, [kind, kind])
-    found = formula(*code.arguments)
-    code.builder.ret(code.select(found, *((1.0, 0.0) if kind is DOUBLE else (1, 0))) if is_flag(found) else found)
-    machine = compiled(module)
+
+    def write(_, code) -> Operand:
+        found = formula(*code.arguments)
+        is_flag = found.type == ir.IntType(1)
+        return code.select(found, *((1.0, 0.0) if kind is DOUBLE else (1, 0))) if is_flag else found
+
+    machine = machine_of(write, [kind, kind], kind)
     return machine.functions["f"](a, b)
-
-
-def is_flag(value: Operand) -> bool:
-    return value.type == ir.IntType(1)
 
 
 @pytest.mark.parametrize("name", ON_DOUBLES)
@@ -59,17 +49,16 @@ def test_formulas_of_integers(name: str) -> None:
 
 
 def test_formulas_of_eight_doubles() -> None:
-    module = ir.Module("eight")
-    _, code = function(module, "f", ir.VoidType(), [POINTER, POINTER, POINTER])
-    first, second, result = code.arguments
-    a, b = code.load(first, 0), code.load(second, 0)
-    found = [formula(a, b) for formula in ON_DOUBLES.values()]
-    for k, value in enumerate(found):
-        flag = value.type == ir.VectorType(ir.IntType(1), 8)
-        code.store(code.select(value, 1.0, 0.0) if flag else value, result, 8 * k)
-    code.builder.ret_void()
-    machine = compiled(module)
-    arrays = doubles(8), doubles(8), doubles(8 * len(found))
+    def write(_, code) -> None:
+        first, second, result = code.arguments
+        a, b = code.load(first, 0), code.load(second, 0)
+        for k, formula in enumerate(ON_DOUBLES.values()):
+            value = formula(a, b)
+            flag = value.type == ir.VectorType(ir.IntType(1), 8)
+            code.store(code.select(value, 1.0, 0.0) if flag else value, result, 8 * k)
+
+    machine = machine_of(write, [POINTER] * 3)
+    arrays = doubles(8), doubles(8), doubles(8 * len(ON_DOUBLES))
     arrays[0][:5], arrays[1][:5] = zip(*PAIRS, strict=True)
     arrays[1][5:] = 1.0
     machine.functions["f"](*map(pointer, arrays))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 
 import pytest
-from llvmlite import binding
+from llvmlite import binding, ir
 
-from heavytop.multiword.codegen.machine_code import Processor
+from heavytop.multiword.codegen.machine_code import Code, Machine, Operand, Processor, compiled, function
 from heavytop.multiword.problem import Scaled
 from heavytop.top.equations import HEAVY_TOP, Parameters
 
@@ -18,6 +19,17 @@ def problem(spin: int = 1, attitude: bool = False) -> Scaled:
     )
     y = tuple(Fraction(text) * spin for text in ("1/10", "1/5", "9/10"))
     return Scaled.of(HEAVY_TOP, p, (*y, *map(Fraction, ("3/5", "0", "4/5", *(("0", "1", "0") if attitude else ())))))
+
+
+def machine_of(
+    write: Callable[[ir.Module, Code], Operand | None], arguments: Sequence[ir.Type], result: ir.Type | None = None
+) -> Machine:
+    """Machine code of a function ``f`` of what ``write`` writes, which returns its result where it has one."""
+    module = ir.Module("f")
+    _, code = function(module, "f", result or ir.VoidType(), arguments)
+    value = write(module, code)
+    code.builder.ret_void() if result is None else code.builder.ret(value)
+    return compiled(module)
 
 
 def here(feature: str) -> bool:
