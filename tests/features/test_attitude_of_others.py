@@ -1,7 +1,5 @@
 """The attitude of third-party integrators: measured where they declare it, with planted errors that a gate sees."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from math import isclose
 from pathlib import Path

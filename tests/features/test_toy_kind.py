@@ -1,7 +1,5 @@
 """A kind of measurement is one file and one line: this one is a toy, and everything works with it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 

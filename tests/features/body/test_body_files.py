@@ -1,7 +1,5 @@
 """Bodies out of files of robots: every format, every slip, and bodies that are right."""
 
-from __future__ import annotations
-
 import json
 import random
 import shlex

@@ -3,8 +3,6 @@
 test_guard.py has the process of its own, test_conditions.py that search.
 """
 
-from __future__ import annotations
-
 import pytest
 
 from support import audits

@@ -1,7 +1,5 @@
 """The exact algebra proves true identities, never a false one."""
 
-from __future__ import annotations
-
 import random
 from fractions import Fraction
 from itertools import permutations

@@ -1,7 +1,5 @@
 """Angles that are parts of pi, and inverse functions of one another: in their range, and beside it."""
 
-from __future__ import annotations
-
 import pytest
 
 from support.claim_tables import rotation

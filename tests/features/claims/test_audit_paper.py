@@ -1,7 +1,5 @@
 """The verdicts on the paper's claims, and what the audit makes of planted mistakes."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from functools import cache
 

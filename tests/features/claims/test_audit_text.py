@@ -1,7 +1,5 @@
 """A residual in the lines of a narrow column."""
 
-from __future__ import annotations
-
 import re
 from random import Random
 

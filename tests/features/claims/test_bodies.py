@@ -1,7 +1,5 @@
 """A claim is about bodies: a top that does not change, |γ| = 1, moments that a body has; all else is said by name."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import pytest

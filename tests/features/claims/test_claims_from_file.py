@@ -1,7 +1,5 @@
 """Claims that users write: the worked examples, planted errors in them, and files that mean harm."""
 
-from __future__ import annotations
-
 import json
 import time
 import tomllib

@@ -1,7 +1,5 @@
 """The page of audited claims: what stands in an entry is shown, none of it is read as markup."""
 
-from __future__ import annotations
-
 import copy
 import json
 import re

@@ -1,7 +1,5 @@
 """A proof has conditions: what is undefined, not real, jumps or is not kept by the flow never holds, and is named."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

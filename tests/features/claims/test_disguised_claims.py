@@ -1,7 +1,5 @@
 """True claims in disguise hold, their false neighbours do not: each rule of the proofs with what is just beyond it."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import pytest

@@ -1,7 +1,5 @@
 """The figures: their data against independent values, and the files themselves."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from xml.etree import ElementTree
 

@@ -1,7 +1,5 @@
 """The process of an audit: from a plain script and from threads, and what is said of it when it dies."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

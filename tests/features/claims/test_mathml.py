@@ -1,7 +1,5 @@
 """Formulas typeset: read back from the MathML they are the same formula, and nothing in a text becomes markup."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from random import Random

@@ -1,7 +1,5 @@
 """Single conditions of the proofs, each with a claim that would be proven falsely, or not at all, without it."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import pytest

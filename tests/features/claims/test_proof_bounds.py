@@ -1,7 +1,5 @@
 """The bounds of a proof, one by one: what a formula needs, the sign of a value, continuity, where halves join."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import pytest

@@ -1,7 +1,5 @@
 """Motions in a variable u with t = F(u): they hold where F has an inverse, and nowhere else."""
 
-from __future__ import annotations
-
 import tomllib
 from importlib.resources import files
 from typing import Any

@@ -1,7 +1,5 @@
 """Signs and balls of the claims' algebra: true where they are told, against plain numbers."""
 
-from __future__ import annotations
-
 import math
 import random
 from fractions import Fraction

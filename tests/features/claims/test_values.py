@@ -1,7 +1,5 @@
 """Claims of kind `value`: published numbers, against numbers that are known otherwise."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from fractions import Fraction

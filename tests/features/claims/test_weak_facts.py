@@ -1,7 +1,5 @@
 """A fact ≥ 0 is not taken for one > 0, and a relation is solved only where the solution is the whole of it."""
 
-from __future__ import annotations
-
 import pytest
 import sympy
 

@@ -1,7 +1,5 @@
 """Claims in Weierstrass' functions and about tops with products of inertia: proofs, their conditions, and traps."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from typing import Any
 

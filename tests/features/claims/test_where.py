@@ -1,7 +1,5 @@
 """Claims on conditions: states found without help, conditions in other words, and their false neighbours."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import pytest

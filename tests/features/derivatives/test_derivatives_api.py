@@ -1,7 +1,5 @@
 """Derivatives from Python and from the command line: shapes, guards, what a Jacobian is worth, and its conventions."""
 
-from __future__ import annotations
-
 import json
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction

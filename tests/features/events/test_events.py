@@ -1,7 +1,5 @@
 """Events against root finding that shares nothing with them: mpmath on Taylor series of its own, and closed forms."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import random

@@ -1,7 +1,5 @@
 """Events of bodies in axes of their own: the function and the states are of the axes given."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`propagate --events` and `reference --events`: the keys, the texts and the errors."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """Zeros of several factors at one time: undecided by name; polynomials are short near them, and as narrow as before."""
 
-from __future__ import annotations
-
 import random
 from fractions import Fraction
 

@@ -1,7 +1,5 @@
 """When digits end, what a test detects, and what lies between samples: against brute force and exact cases."""
 
-from __future__ import annotations
-
 import json
 import math
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """Logs of robots, spacecraft and simulators: one motion in every form is scored as the plain file of it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache

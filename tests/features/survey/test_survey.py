@@ -1,7 +1,5 @@
 """A survey: the records equal what the scorer says of each motion alone, and the file its row of the report."""
 
-from __future__ import annotations
-
 import json
 import math
 from fractions import Fraction
