@@ -20,7 +20,7 @@ from heavytop.features.score.trajectories.files import read
 from heavytop.measure.motion import compute
 from heavytop.measure.scalar import digits_kept
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, real
-from support import in_process
+from support.in_process import heavytop
 
 DOCS = Path(__file__).parents[3] / "docs"
 LAGRANGE = CASES["lagrange"]
@@ -46,14 +46,15 @@ def as_csv(given: dict, number=str) -> str:
     return "\n".join([*lines, HEADER, *(",".join([t, *map(number, state)]) for t, state in rows)]) + "\n"
 
 
-command = in_process.heavytop
+def row_of(tmp_path: Path, given: dict):
+    return measured(read(written(tmp_path, given))).row
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, QUAD, real(160)], ids=lambda p: p.name)
 def test_our_own_motion_scores_as_it_scored_itself(precision, tmp_path: Path) -> None:
     given = document(precision)
-    row = measured(read(written(tmp_path, given))).row
+    row = row_of(tmp_path, given)
     ours = {name: metric["value"] for name, metric in given["metrics"].items()}
     assert ours == {name: m.value for name, m in row.metrics.items() if name.startswith("drift_")}
     assert (row.outcome, row.precision, row.steps) == ("success", precision.name, given["steps"])
@@ -83,7 +84,7 @@ def test_a_known_mistake_is_measured(tmp_path: Path) -> None:
     given = document(QUAD)
     off = exact(given["states"][1][3]) + Fraction(1, 10**9)
     given["states"][1][3] = str(float(off))
-    row = measured(read(written(tmp_path, given))).row
+    row = row_of(tmp_path, given)
     np.testing.assert_allclose(float(row.metrics["solution_error_gamma_max"].value), 1e-9, rtol=1e-5)
     assert float(row.metrics["solution_error_gamma_final"].value) < 1e-30
     assert digits_kept(row) == 9
@@ -93,8 +94,7 @@ def test_a_known_mistake_is_measured(tmp_path: Path) -> None:
 def test_csv_and_json_decimal_and_hexadecimal_say_the_same(number, tmp_path: Path) -> None:
     given = document()
     (tmp_path / "motion.csv").write_text(as_csv(given, number), "utf-8")
-    one, two = measured(read(tmp_path / "motion.csv")).row, measured(read(written(tmp_path, given))).row
-    assert one == two
+    assert measured(read(tmp_path / "motion.csv")).row == row_of(tmp_path, given)
 
 
 @pytest.mark.slow
@@ -120,13 +120,13 @@ def test_hexadecimal_floats_are_exact(tmp_path: Path) -> None:
 def test_what_is_not_finite_is_a_verdict(word: str, tmp_path: Path) -> None:
     given = document()
     given["states"][1][4] = word
-    row = measured(read(written(tmp_path, given))).row
-    first = measured(read(written(tmp_path, given | {"times": given["times"][:1], "states": given["states"][:1]}))).row
+    row = row_of(tmp_path, given)
+    first = row_of(tmp_path, given | {"times": given["times"][:1], "states": given["states"][:1]})
     assert (row.outcome, row.finite) == ("non_finite", False)
     assert (row.time_reached, row.horizon) == (first.horizon, "7")
     assert row.metrics["solution_error_omega_max"] == first.metrics["solution_error_omega_max"]
     given["states"][0][0] = word
-    none = measured(read(written(tmp_path, given))).row
+    none = row_of(tmp_path, given)
     assert none.time_reached == "0"
     assert {metric.value for metric in none.metrics.values()} == {"missing"}
     assert digits_kept(none) is None
@@ -213,13 +213,13 @@ def test_a_misspelt_key_is_named_with_the_nearest_and_comments_stay_free(tmp_pat
             read(written(tmp_path, given | {key: "1"}))
         assert remedy in caught.value.remedy
     text = as_csv(given)
-    (tmp_path / "a.csv").write_text(f"# made on a Sunday\n# author: A. N. Other\n{text}", "utf-8")
-    plain = read(tmp_path / "a.csv")
-    (tmp_path / "a.csv").write_text(f"# tolerence: 1e-9\n{text}", "utf-8")
+    plain, commented = tmp_path / "plain.csv", tmp_path / "commented.csv"
+    plain.write_text(text, "utf-8")
+    commented.write_text(f"# made on a Sunday\n# author: A. N. Other\n{text}", "utf-8")
+    assert read(commented).states == read(plain).states
+    commented.write_text(f"# tolerence: 1e-9\n{text}", "utf-8")
     with pytest.raises(InputError, match="Unknown key 'tolerence'"):
-        read(tmp_path / "a.csv")
-    (tmp_path / "a.csv").write_text(text, "utf-8")
-    assert read(tmp_path / "a.csv").states == plain.states
+        read(commented)
 
 
 @pytest.mark.slow
@@ -232,7 +232,7 @@ def test_what_no_body_has_and_states_in_another_order_are_warnings(tmp_path: Pat
     swapped = given | {"states": [[*state[3:], *state[:3]] for state in given["states"]]}
     (warning,) = read(written(tmp_path, swapped)).warnings()
     assert "are the states in the order omega1" in warning
-    said = command("score", str(written(tmp_path, swapped)), "--json")
+    said = heavytop("score", str(written(tmp_path, swapped)), "--json")
     assert said.stderr == f"heavytop: warning: {warning}\n"
     assert json.loads(said.stdout)["measure"] == "score"
     huge = given | {"states": [[*state[:3], "1e200", *state[4:]] for state in given["states"]]}
@@ -242,34 +242,31 @@ def test_what_no_body_has_and_states_in_another_order_are_warnings(tmp_path: Pat
 
 @pytest.mark.slow
 def test_the_command_scores_writes_a_report_and_pipes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    options = ["--inertia", "5/2,5/2,3/2", "--weight", "2", "--centre", "0,0,3/4", "--omega", "1/5,-1/3,7/4"]
-    options += ["--gamma", "2/7,3/7,6/7", "--times", "1,5", "--json"]
-    made = command("propagate", *options)
+    made = heavytop("propagate", "--case", "lagrange", "--times", "1,5", "--json")
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(made.stdout.encode())))
-    piped = command("score", "-", "--json")
+    piped = heavytop("score", "-", "--json")
     assert piped.returncode == 0, piped.stderr
     assert json.loads(piped.stdout)["digits_kept"] > 14
     file = tmp_path / "motion.json"
     file.write_text(made.stdout)
-    done = command("score", str(file), "--out", str(tmp_path / "out"))
+    done = heavytop("score", file, "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
     said = " ".join(done.stdout.split())
     assert re.match(r"1[45]\.\d of 16 digits right at every sample up to T = 5; heyoka in double: 1", said)
-    same = command("compare", str(tmp_path / "out"), str(tmp_path / "out"))
-    assert same.returncode == 0
+    assert heavytop("compare", tmp_path / "out", tmp_path / "out").returncode == 0
     spoilt = json.loads(made.stdout)
     spoilt["states"][1][0] = str(exact(spoilt["states"][1][0]) * (1 + Fraction(1, 10**9)) * 10**20 // 1) + "e-20"
     file.write_text(json.dumps(spoilt))
-    assert command("score", str(file), "--out", str(tmp_path / "worse")).returncode == 0
-    assert command("compare", str(tmp_path / "out"), str(tmp_path / "worse")).returncode == 1
-    again = command("score", str(file), "--out", str(tmp_path / "worse"))
+    assert heavytop("score", file, "--out", tmp_path / "worse").returncode == 0
+    assert heavytop("compare", tmp_path / "out", tmp_path / "worse").returncode == 1
+    again = heavytop("score", file, "--out", tmp_path / "worse")
     assert again.returncode == 2
     assert "already holds" in again.stderr
     file.write_text(made.stdout.replace('"0.', '"nan0.', 1))
-    assert command("score", str(file)).returncode == 2
+    assert heavytop("score", file).returncode == 2
     spoilt["states"][1][0] = "nan"
     file.write_text(json.dumps(spoilt))
-    lost = command("score", str(file))
+    lost = heavytop("score", file)
     assert (lost.returncode, "non_finite" in lost.stdout) == (3, True)
 
 
@@ -289,7 +286,7 @@ def test_a_state_too_large_for_its_format_is_not_finite(precision: str, size: st
     given = document() | {"precision": precision}
     del given["bits"]
     given["states"][1] = [size, *given["states"][1][1:]]
-    row = measured(read(written(tmp_path, given))).row
+    row = row_of(tmp_path, given)
     assert (row.outcome, row.samples) == ("non_finite", 1)
     given["states"][1] = ["1e308", *given["states"][1][1:]]
     assert measured(read(written(tmp_path, given))).row.outcome == "success"
