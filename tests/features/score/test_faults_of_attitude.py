@@ -57,28 +57,23 @@ def motion(
     return np.array(rows)
 
 
-def changed(place: int, factor: float) -> np.ndarray:
-    factors = np.ones(3)
-    factors[place] = factor
-    return factors
-
-
 def column(rows: np.ndarray, place: int, change: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
     rows = rows.copy()
     rows[:, place] = change(rows[:, place])
     return rows
 
 
+I12_TURNED = [[1, -1, 1], [-1, 1, 1], [1, 1, 1]]
 TURNED = product(START, np.array([0.9, 0.3, -0.1, 0.3]))
 FAULTS: Mapping[str, tuple[Callable[[], np.ndarray], Mapping[str, str]]] = {
     "": (motion, {}),
     "gyroscopic_sign": (lambda: motion(gyroscopic=-KEEP, rotor=ROTOR), {}),
-    "term_missing": (lambda: motion(gyroscopic=changed(1, 0.0)), {"column": "M2", "term": "the gyroscopic term"}),
-    "steiner": (lambda: motion(CENTRAL + 2 * STEINER), {"times": "2"}),
-    "products_of_inertia": (
-        lambda: motion(CENTRAL * [[1, -1, 1], [-1, 1, 1], [1, 1, 1]] + STEINER),
-        {"entries": "I12"},
+    "term_missing": (
+        lambda: motion(gyroscopic=np.array([1.0, 0.0, 1.0])),
+        {"column": "M2", "term": "the gyroscopic term"},
     ),
+    "steiner": (lambda: motion(CENTRAL + 2 * STEINER), {"times": "2"}),
+    "products_of_inertia": (lambda: motion(CENTRAL * I12_TURNED + STEINER), {"entries": "I12"}),
     "mass": (lambda: motion(CENTRAL + 1.3 * STEINER, 1.3), {"factor": "1.3"}),
     "start": (lambda: motion(begin=TURNED), {}),
     "times_shifted": (lambda: motion(shift=0.07), {"shift": "0.07"}),
