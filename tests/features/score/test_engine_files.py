@@ -14,7 +14,6 @@ import engine_files
 from engine_files import Log
 from heavytop.features.score.measurement import Assessment
 from heavytop.features.score.text import to_json
-from support.in_process import heavytop
 
 COARSE = replace(engine_files.random_engine(random.Random(5), "semi-implicit Euler"), step=1e-3, every=50, samples=12)
 FINE = replace(COARSE, method="Munthe-Kaas", step=0.005, every=40, omega=np.array([0.7, -0.4, 3.0]))
@@ -143,11 +142,3 @@ def test_a_rounded_quaternion_of_the_start_leaves_the_error_of_the_attitude_reso
         error = found.row.metrics[f"attitude_error_{statistic}"]
         assert error.bound is None
         assert float(error) == pytest.approx(float(without.row.metrics[f"attitude_error_{statistic}"]), rel=0.1)
-
-
-def test_no_digit_is_right_in_json_and_in_the_terminal_alike(tmp_path: Path) -> None:
-    content = engine_files.written(COARSE, of_columns(np.degrees, "omega"))
-    (tmp_path / "log.csv").write_text(content, "utf-8")
-    shown, as_json = (heavytop("score", str(tmp_path / "log.csv"), *options) for options in ((), ("--json",)))
-    assert json.loads(as_json.stdout)["digits_right"] == 0.0
-    assert "0.0 of 1" in shown.stdout

@@ -108,14 +108,6 @@ def test_the_format_is_inferred_from_what_is_written(precision, tmp_path: Path) 
     assert read(written(tmp_path, given | {"bits": precision.bits})).precision.bits == precision.bits
 
 
-def test_hexadecimal_floats_are_exact(tmp_path: Path) -> None:
-    states = [["0x1.8p+1", "-0X.8", "0xA.8P-2", "0x0p+0", "0x1p-1074", "0x1.fffffffffffffp+0"]]
-    given = document(times=[Fraction(1)]) | {"states": states}
-    values = read(written(tmp_path, given)).states[0]
-    expected = [float.fromhex(text) for text in states[0]]
-    assert values == tuple(map(Fraction, expected))
-
-
 @pytest.mark.parametrize("word", ["nan", "NaN", "inf", "-Infinity"])
 def test_what_is_not_finite_is_a_verdict(word: str, tmp_path: Path) -> None:
     given = document()

@@ -124,52 +124,49 @@ def test_several_states_are_named_and_a_tail_is_not() -> None:
     assert kinds(scored(states, times)) == []
 
 
-FACTORS = {"omega_in_degrees": 180 / np.pi, "omega_in_turns": 0.5 / np.pi, "omega_in_rpm": 30 / np.pi}
+COLUMNS = ("Ω1", "Ω2", "Ω3", "γ1", "γ2", "γ3")
+SCALED: dict[str, tuple[np.ndarray, str, dict[str, float]]] = {
+    "degrees": (180 / np.pi * OMEGA + GAMMA, "omega_in_degrees", {}),
+    "turns": (0.5 / np.pi * OMEGA + GAMMA, "omega_in_turns", {}),
+    "rpm": (30 / np.pi * OMEGA + GAMMA, "omega_in_rpm", {}),
+    "Ω, reversed": (-1.02 * OMEGA + GAMMA, "omega_scaled", {"factor": -1.02}),
+    "Ω, small": (0.001 * OMEGA + GAMMA, "omega_scaled", {"factor": 0.001}),
+    **{
+        COLUMNS[column]: (np.where(np.arange(6) == column, factor, 1.0), "column_scaled", {"factor": factor})
+        for column, factor in ((0, 1.02), (4, 0.5), (2, -1.0))
+    },
+    COLUMNS[5]: (np.where(np.arange(6) == 5, 0.0, 1.0), "column_constant", {}),
+}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("factor", [-1.02, 0.001])
-def test_a_factor_of_omega_is_told_with_its_number(factor: float) -> None:
-    (told,) = scored(RIGHT * (factor * OMEGA + GAMMA)).diagnoses
-    assert told.kind == "omega_scaled"
-    assert float(told.numbers["factor"]) == pytest.approx(factor, rel=1e-7)
-    assert f"Ω is {told.numbers['factor']} times what fits" in diagnosis_text(told)
+@pytest.mark.parametrize("name", SCALED)
+def test_columns_that_are_scaled_are_named_with_their_factor(name: str) -> None:
+    factors, kind, numbers = SCALED[name]
+    (told,) = scored(RIGHT * factors).diagnoses
+    assert (told.kind, told.numbers.get("column")) == (kind, name if name in COLUMNS else None)
+    assert all(float(told.numbers[key]) == pytest.approx(value, rel=1e-7) for key, value in numbers.items())
+    text = diagnosis_text(told)
+    assert kind != "omega_scaled" or f"Ω is {told.numbers['factor']} times what fits" in text
+    assert ("has the other sign in these states" in text) == (numbers.get("factor") == -1)
+    if "_in_" in kind:
+        assert kinds(scored(RIGHT[:1] * factors, TIMES[:1])) == [kind]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", FACTORS)
-@pytest.mark.parametrize("rows", [1, 20])
-def test_units_of_omega_are_named(kind: str, rows: int) -> None:
-    assert kinds(scored((RIGHT * (FACTORS[kind] * OMEGA + GAMMA))[:rows], TIMES[:rows])) == [kind]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("factor", "kind"), [(30 / np.pi, "rpm"), (3, "")])
+@pytest.mark.parametrize(("factor", "kind"), [(30 / np.pi, "all_in_rpm"), (3, "all_scaled")])
 def test_a_factor_of_omega_in_start_and_states_is_told(factor: float, kind: str) -> None:
     start = State([w * Fraction(factor) for w in START.omega], START.gamma)
     (told,) = scored(RIGHT * (factor * OMEGA + GAMMA), start=start).diagnoses
-    assert told.kind == (f"all_in_{kind}" if kind else "all_scaled")
-    assert kind or float(told.numbers["factor"]) == pytest.approx(factor, rel=1e-7)
+    assert told.kind == kind
+    assert kind == "all_in_rpm" or float(told.numbers["factor"]) == pytest.approx(factor, rel=1e-7)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("column", "factor"), [(0, 1.02), (4, 0.5), (2, -1.0), (5, 0.0)])
-def test_a_column_that_is_scaled_or_constant_is_named(column: int, factor: float) -> None:
-    states = RIGHT.copy()
-    states[:, column] *= factor
-    (told,) = scored(states).diagnoses
-    assert told.kind == ("column_scaled" if factor else "column_constant")
-    assert told.numbers["column"] == ("Ω1", "Ω2", "Ω3", "γ1", "γ2", "γ3")[column]
-    assert float(told.numbers.get("factor", 0)) == pytest.approx(factor)
-    assert ("has the other sign in these states" in diagnosis_text(told)) == (factor == -1)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("factor", ["1.02"])
-def test_a_factor_of_time_is_told(factor: str) -> None:
-    (told,) = scored(RIGHT, [time * Fraction(factor) for time in TIMES]).diagnoses
+def test_a_factor_of_time_is_told() -> None:
+    (told,) = scored(RIGHT, [time * Fraction("1.02") for time in TIMES]).diagnoses
     assert told.kind == "time_unit"
-    assert float(told.numbers["factor"]) == pytest.approx(1 / float(Fraction(factor)), rel=1e-5)
+    assert float(told.numbers["factor"]) == pytest.approx(1 / 1.02, rel=1e-5)
 
 
 @pytest.mark.slow

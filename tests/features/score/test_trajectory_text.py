@@ -235,7 +235,8 @@ def test_rounded_data_of_a_case_are_still_that_case(tmp_path: Path) -> None:
     ("text", "value"),
     [
         ("1.5D+00", "3/2"), ("-2.5d-3", "-1/400"), ("1.25Q1", "12.5"), ("1.5-101", "1.5e-101"), ("1.5+101", "1.5e101"),
-        ("0x1.8p+1", "3"), (" 7 ", "7"), ("1e5", "100000"),
+        ("0x1.8p+1", "3"), ("-0X.8", "-1/2"), ("0xA.8P-2", "21/8"), ("0x0p+0", "0"), (" 7 ", "7"), ("1e5", "100000"),
+        ("0x1p-1074", f"1/{2**1074}"), ("0x1.fffffffffffffp+0", f"{2**53 - 1}/{2**52}"),
     ],
 )  # fmt: skip
 def test_numbers_of_fortran_and_c_are_read(text: str, value: str) -> None:
