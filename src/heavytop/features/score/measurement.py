@@ -133,7 +133,7 @@ def _in_axes_of_file(samples: Observations) -> list[tuple[Any, ...]]:
     omega, gamma = (columns.get(name, unknown) for name in ("omega", "gamma"))
     parts = [omega, gamma]
     if form is not None:
-        rotation = reading.rotation(form, columns[form])
+        rotation = reading.rotations(form, columns[form])
         parts = [omega, rotation[:, 2], rotation[:, 0]]
         if "omega" not in columns and "omega_space" in columns:
             parts[0] = numpy.einsum("nji,nj->ni", rotation, reading.vectors(columns["omega_space"], True))

@@ -46,7 +46,7 @@ from heavytop.features.score.diagnose.search import (
     Search,
     scope,
 )
-from heavytop.measure.attitude_error import FORMS
+from heavytop.measure.attitude_error import ANGLES, DIRECTIONS, FORMS, ORDERS
 from heavytop.precision import decimal_text
 from heavytop.top.attitude import SEQUENCES
 
@@ -255,7 +255,7 @@ def _columns(samples: Observations) -> Iterator[Row]:
     for quantity, names in _WORDS.items():
         if quantity not in samples.columns:
             continue
-        if quantity == "quaternion" and samples.said.scalar_last:
+        if quantity == "quaternion" and samples.said.quaternion_order == "xyzw":
             names = *names[1:], names[0]
         unit = numpy.eye(len(names))
         for place, name in enumerate(names):
@@ -352,7 +352,7 @@ def _early_rates(search: ConventionSearch) -> Iterator[Row]:
     name = next((name for name in ("omega", "omega_space") if name in samples.columns), None)
     if name is None or len(samples.columns) < 2 or len(samples.times) < 3:
         return
-    values = samples.said.vectors(samples.columns[name], True) if name == "omega_space" else samples.columns[name]
+    values, _ = samples.said.angular_velocity(name, samples.columns[name])
 
     def off(x: Array) -> Array:
         within = abs(x[0]) <= abs(samples.times[-1])
@@ -395,14 +395,17 @@ Named = tuple[str, dict[str, str], Reading]
 def _readings(samples: Observations) -> Iterator[Named]:
     """Readings without a fitted number, the likeliest first."""
     said, forms = samples.said, _forms(samples)
-    scalar, conjugate = {"scalar_last": not said.scalar_last}, {"conjugate": not said.conjugate}
+    words = {"quaternion_order": ORDERS, "quaternion": DIRECTIONS, "matrix": DIRECTIONS, "angles": ANGLES}
+    order, conjugate, transposed, unit = (
+        {key: next(word for word in pair if word != getattr(said, key))} for key, pair in words.items()
+    )
     frame = "body" if "omega_space" in forms else "space"
     sequences = [{"sequence": sequence} for sequence in SEQUENCES if sequence != said.sequence]
     rows: list[tuple[str, str, dict[str, str], dict[str, Any]]] = [
-        ("quaternion", "scalar_last", {"quaternion_order": "wxyz" if said.scalar_last else "xyzw"}, scalar),
-        ("quaternion", "conjugate", {"quaternion": _other(said.conjugate)}, conjugate),
-        ("matrix", "transposed", {"matrix": _other(said.transposed)}, {"transposed": not said.transposed}),
-        ("euler", "degrees", {"unit": "radians" if said.degrees else "degrees"}, {"degrees": not said.degrees}),
+        ("quaternion", "scalar_last", order, order),
+        ("quaternion", "conjugate", conjugate, conjugate),
+        ("matrix", "transposed", transposed, transposed),
+        ("euler", "degrees", {"unit": unit["angles"]}, unit),
         ("euler", "extrinsic", {"sequence": said.sequence}, {"extrinsic": True}),
         ("euler", "angles_negated", {}, {"negated": True}),
         *(("euler", "sequence", other, other) for other in sequences),
@@ -413,16 +416,11 @@ def _readings(samples: Observations) -> Iterator[Named]:
         ("omega", "omega_reversed", {}, {"omega": -1.0}),
         ("omega", "momentum", {}, {"momentum": True}),
         ("gamma", "gamma_down", {}, {"gamma": -1.0}),
-        ("quaternion", "scalar_last_conjugate", {}, {**scalar, **conjugate}),
+        ("quaternion", "scalar_last_conjugate", {}, order | conjugate),
     ]
     named_so = {"omega_space": "omega", "rows": "gamma"}
     given = {named_so.get(form, form) for form in forms}
     yield from ((kind, numbers, replace(said, **changes)) for form, kind, numbers, changes in rows if form in given)
-
-
-def _other(inverse: bool) -> str:
-    """The direction opposite to the one that the file states."""
-    return "body_to_space" if inverse else "space_to_body"
 
 
 def _axes_of_space(samples: Observations) -> Iterator[Named]:
@@ -503,7 +501,7 @@ def _positions(samples: Observations) -> Iterator[Row]:
     for name, factor in _LENGTHS.items():
         rows += [("position_unit", {"factor": name}, {"scale": factor, "displaced": moved}) for moved in (False, True)]
     if samples.body.centre.any() and not numpy.array_equal(samples.point, samples.body.centre):
-        rows.append(("position_of_centre", {}, {"point": tuple(samples.body.centre)}))
+        rows.append(("position_of_centre", {}, {"of_point": tuple(samples.body.centre)}))
     yield from ((kind, numbers, {"columns": replace(samples.said, **changes)}) for kind, numbers, changes in rows)
 
 
@@ -547,21 +545,21 @@ def _fitted(samples: Observations, simulated: SimulatedMotion) -> Iterator[Row]:
     offset = (positions - true).mean(axis=0)
     yield "pivot", {"offset": _list(offset)}, {"columns": replace(said, offset=tuple(offset)), **_FITTED}
     in_body = numpy.einsum("nji,nj->ni", simulated.rotation, positions).mean(axis=0)
-    yield "point", {"point": _list(in_body)}, {"columns": replace(said, point=tuple(in_body)), **_FITTED}
+    yield "point", {"point": _list(in_body)}, {"columns": replace(said, of_point=tuple(in_body)), **_FITTED}
     design = numpy.concatenate([simulated.rotation, numpy.tile(numpy.eye(3), (len(positions), 1, 1))], axis=2)
     if len(positions) >= _FEWEST and numpy.isfinite(design).all() and numpy.isfinite(positions).all():
         both = numpy.linalg.lstsq(design.reshape(-1, 6), positions.reshape(-1), rcond=None)[0]
-        reading = replace(said, point=tuple(both[:3]), offset=tuple(both[3:]))
+        reading = replace(said, of_point=tuple(both[:3]), offset=tuple(both[3:]))
         numbers = {"point": _list(both[:3]), "offset": _list(both[3:])}
         yield "point_and_pivot", numbers, {"columns": reading, **_FITTED}
 
 
 def _turned(samples: Observations, simulated: SimulatedMotion) -> Iterator[Row]:
     """A constant rotation of the axes of space, or of the body."""
-    for form in ("quaternion", "matrix", "euler"):
+    for form in FORMS:
         if form not in samples.columns:
             continue
-        rotations = samples.said.rotation(form, samples.columns[form])
+        rotations = samples.said.rotations(form, samples.columns[form])
         if not numpy.isfinite(rotations).all():
             return
         space = nearest_rotation((rotations @ simulated.rotation.transpose(0, 2, 1)).mean(axis=0))
@@ -585,7 +583,7 @@ def _scaled(samples: Observations, simulated: SimulatedMotion) -> Iterator[Row]:
         if name not in samples.columns:
             continue
         true = simulated.omega_space if name == "omega_space" else simulated.omega
-        vectors = samples.said.vectors(samples.columns[name], True) if name == "omega_space" else samples.columns[name]
+        vectors, _ = samples.said.angular_velocity(name, samples.columns[name])
         size = float((true * true).sum())
         if size:
             yield from _near("omega_scaled", float((vectors * true).sum()) / size, samples.said, "omega")

@@ -13,9 +13,9 @@ import numpy
 
 from heavytop.features.score.diagnose.samples import floats, motion_in_double, principal
 from heavytop.features.score.diagnose.search import Array
-from heavytop.measure.attitude_error import UPS, Convention
+from heavytop.measure.attitude_error import DIRECTIONS, FORMS, UPS, Convention
 from heavytop.precision import cross
-from heavytop.top.attitude import matrix_of_quaternion, quaternion_products, rows_of, rows_of_euler
+from heavytop.top.attitude import quaternion_products, rows_of
 from heavytop.top.bodies import CENTRE, Body
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
@@ -140,33 +140,25 @@ def turning(body: BodyData, start: InitialState) -> float:
     return _rate(numpy.asarray(moments, dtype=numpy.float64), body.force * body.centre, start.omega) or 1.0
 
 
-_NUMPY = SimpleNamespace(sin=numpy.sin, cos=numpy.cos)
-_DEGREE = numpy.pi / 180
+_NUMPY = SimpleNamespace(sin=numpy.sin, cos=numpy.cos, pi=numpy.pi)
 _EYE = tuple(map(tuple, numpy.eye(3).tolist()))
 Square = tuple[tuple[float, ...], ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
-    """One reading of the columns, or of the start.
+class Reading(Convention):
+    """One reading of the columns, or of the start: a convention, and what no file may declare.
 
-    scalar_last, conjugate: of quaternions.  transposed: of matrices.  sequence, extrinsic, negated, degrees: of angles.
-    up: the axis that points up.  swapped: Ω declared in body axes is in space axes, and conversely.
+    extrinsic, negated: of Euler angles.  swapped: Ω declared in body axes is in space axes, and conversely.
     omega, gamma: factors of the columns of Ω and γ.  momentum: the columns of Ω are M.
     space, body: rotations Q, B so that the file's vectors are Q v and B v.  mirror: the axis, from 0, that is reversed;
     pseudo: whether Ω then transforms as an axial vector.
     scale: a factor of positions.  displaced: from the first position.  offset: added to every position, in canonical
-    axes of space.  point: whose positions they are; None for the declared one.
+    axes of space.  of_point: whose positions they are; None for the declared one.
     """
 
-    scalar_last: bool = False
-    conjugate: bool = False
-    transposed: bool = False
-    sequence: str = ""
     extrinsic: bool = False
     negated: bool = False
-    degrees: bool = False
-    up: str = "z"
     swapped: bool = False
     omega: float = 1.0
     gamma: float = 1.0
@@ -178,42 +170,31 @@ class Reading:
     scale: float = 1.0
     displaced: bool = False
     offset: tuple[float, ...] = (0.0, 0.0, 0.0)
-    point: tuple[float, ...] | None = None
+    of_point: tuple[float, ...] | None = None
 
     @classmethod
     def of(cls, said: Convention) -> Reading:
         """The reading that a file declares."""
-        return cls(
-            scalar_last=said.quaternion_order == "xyzw",
-            conjugate=said.quaternion == "space_to_body",
-            transposed=said.matrix == "space_to_body",
-            sequence=said.sequence,
-            degrees=said.angles == "degrees",
-            up=said.up,
-        )
+        return cls(said.quaternion_order, said.quaternion, said.matrix, said.sequence, said.angles, said.up)
 
-    def rotation(self, form: str, values: Array) -> Array:
+    def rotations(self, form: str, values: Array) -> Array:
         """R in canonical axes of space from the columns of ``form``, shape (n, 3, 3)."""
-        rotations = self._plain(form, values)
+        convention: Convention = self
+        if form == "euler" and self.extrinsic:
+            convention, values = replace(self, sequence=self.sequence[::-1]), values[:, ::-1]
+        if form == "euler" and self.negated:
+            values = -values
+        rotations: Array = numpy.array(convention.rotation(form, [*values.T], _NUMPY)).transpose(2, 0, 1)
         if self.mirror is not None:
             signs = numpy.where(numpy.arange(3) == self.mirror, -1.0, 1.0)
             rotations = rotations * signs[:, None] * signs
         columns = numpy.array(self.body).T @ rotations.transpose(0, 2, 1) @ numpy.array(self.space)
         return upright(columns, self.up).transpose(0, 2, 1)
 
-    def _plain(self, form: str, values: Array) -> Array:
-        if form == "quaternion":
-            unit = values / numpy.linalg.norm(values, axis=1)[:, None]
-            w, x, y, z = (unit[:, [3, 0, 1, 2]] if self.scalar_last else unit).T
-            rotations = _stacked(matrix_of_quaternion((w, x, y, z)), len(values))
-            return rotations.transpose(0, 2, 1) if self.conjugate else rotations
-        if form == "matrix":
-            rotations = values.reshape(-1, 3, 3)
-            return rotations.transpose(0, 2, 1) if self.transposed else rotations
-        angles = values * (-1 if self.negated else 1) * (_DEGREE if self.degrees else 1)
-        if self.extrinsic:
-            return _stacked(rows_of_euler(self.sequence[::-1], list(angles[:, ::-1].T), _NUMPY), len(values))
-        return _stacked(rows_of_euler(self.sequence, list(angles.T), _NUMPY), len(values))
+    def angular_velocity(self, name: str, values: Array) -> tuple[Array, bool]:
+        """Ω of the columns of that name, shape (n, 3), and whether it is in axes of space."""
+        in_space = (name == "omega_space") != self.swapped
+        return (self.vectors if in_space else self.body_vectors)(values, True) / self.omega, in_space
 
     def vectors(self, values: Array, axial: bool = False) -> Array:
         """Vectors of space in canonical axes, shape (n, 3)."""
@@ -229,15 +210,6 @@ class Reading:
             return values
         signs = numpy.where(numpy.arange(3) == self.mirror, -1.0, 1.0)
         return values * (-signs if axial and self.pseudo else signs)
-
-
-def _stacked(rows: object, count: int) -> Array:
-    """Rows of columns as an array of matrices."""
-    stacked = numpy.empty((count, 3, 3))
-    for i, row in enumerate(rows):  # type: ignore[arg-type,var-annotated]
-        for j, entry in enumerate(row):
-            stacked[:, i, j] = entry
-    return stacked
 
 
 def upright(vectors: Array, up: str) -> Array:
@@ -274,9 +246,9 @@ class GivenStart:
             if reading.gamma < 0:
                 rotation = rotation * numpy.array([[1.0], [-1.0], [-1.0]])
         elif self.form == "plain":
-            rotation = replace(reading, transposed=False).rotation("matrix", self.values[None, :])[0]
+            rotation = replace(reading, matrix=DIRECTIONS[0]).rotations("matrix", self.values[None, :])[0]
         else:
-            rotation = reading.rotation(self.form, self.values[None, :])[0]
+            rotation = reading.rotations(self.form, self.values[None, :])[0]
         said = self.omega[None, :] / reading.omega
         if self.in_space != reading.swapped:
             omega = rotation.T @ reading.vectors(said, True)[0]
@@ -330,7 +302,7 @@ def _residual(
 ) -> Array:
     size, true = 1.0, simulated.rotation
     if name == "position":
-        point = samples.point if reading.point is None else numpy.array(reading.point)
+        point = samples.point if reading.of_point is None else numpy.array(reading.of_point)
         true = simulated.rotation @ point
         if reading.displaced:
             true = true - samples.start.begin(reading, numpy.eye(3)).rotation @ point
@@ -340,13 +312,12 @@ def _residual(
         read, true = reading.body_vectors(values) / reading.gamma, simulated.rotation[:, 2]
     elif name in ("omega", "omega_space"):
         true = simulated.omega @ body.tensor if reading.momentum else simulated.omega
-        in_space = (name == "omega_space") != reading.swapped
+        read, in_space = reading.angular_velocity(name, values)
         if in_space:
             true = numpy.einsum("nij,nj->ni", simulated.rotation, true)
         size = float(numpy.linalg.norm(true, axis=1).max()) or 1.0
-        read = (reading.vectors if in_space else reading.body_vectors)(values, True) / reading.omega
     else:
-        read = reading.rotation(name, values)
+        read = reading.rotations(name, values)
     off: Array = ((read - true) / size).reshape(len(values), -1)
     return off
 
@@ -356,19 +327,18 @@ def rates_off(samples: Observations, reading: Reading) -> Array | None:
 
     No motion is computed.  None unless the file gives both; infinite where the body turns too far in between.
     """
-    form = next((form for form in ("quaternion", "matrix", "euler") if form in samples.columns), None)
+    form = next((form for form in FORMS if form in samples.columns), None)
     name = next((name for name in ("omega", "omega_space") if name in samples.columns), None)
     if form is None or name is None or len(samples.times) < 2:
         return None
-    rotation = reading.rotation(form, samples.columns[form])
+    rotation = reading.rotations(form, samples.columns[form])
     turn = rotation[:-1].transpose(0, 2, 1) @ rotation[1:]
     skew = numpy.stack([turn[:, k, j] - turn[:, j, k] for j, k in ((1, 2), (2, 0), (0, 1))], axis=1) / 2
     cosine = (numpy.trace(turn, axis1=1, axis2=2) - 1) / 2
     angle = numpy.arctan2(numpy.linalg.norm(skew, axis=1), cosine)
     spans = numpy.diff(numpy.array([float(time) for time in samples.times]))
     rate = skew * (angle / numpy.maximum(numpy.sin(angle), 1e-300) / spans)[:, None]
-    in_space = (name == "omega_space") != reading.swapped
-    omega = (reading.vectors if in_space else reading.body_vectors)(samples.columns[name], True) / reading.omega
+    omega, in_space = reading.angular_velocity(name, samples.columns[name])
     if in_space:
         omega = numpy.einsum("nji,nj->ni", rotation, omega)
     size = max(float(numpy.linalg.norm(rate, axis=1).max()), 1e-300)
@@ -379,8 +349,8 @@ def rates_off(samples: Observations, reading: Reading) -> Array | None:
 def disagreement(samples: Observations) -> dict[tuple[str, str], Array]:
     """Differences of columns of one quantity in each sample, by their names; relative for Ω."""
     columns, said = samples.columns, samples.said
-    forms = [form for form in ("quaternion", "matrix", "euler") if form in columns]
-    rows = {form: said.rotation(form, columns[form]) for form in forms}
+    forms = [form for form in FORMS if form in columns]
+    rows = {form: said.rotations(form, columns[form]) for form in forms}
     errors: dict[tuple[str, str], Array] = {}
     for other in forms[1:]:
         errors[forms[0], other] = numpy.abs(rows[forms[0]] - rows[other]).max(axis=(1, 2))

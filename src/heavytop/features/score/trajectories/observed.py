@@ -394,8 +394,8 @@ class Observed:
         of = body.centre if point is None else floats(point)
         count = min(map(len, columns.values()), default=0)
         reading = Reading.of(self.convention)
-        if self.start.form == "euler" and self.start.degrees != reading.degrees and "euler" not in columns:
-            reading = replace(reading, degrees=self.start.degrees)
+        if self.start.form == "euler" and "euler" not in columns:
+            reading = replace(reading, angles="degrees" if self.start.degrees else "radians")
         return Observations(tuple(times[:count]), columns, body, start, reading, of, pivot) if count else None
 
 
