@@ -7,6 +7,7 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.features.claims.algebra.conditions import written
+from heavytop.features.claims.algebra.prover import KEPT
 from support.claim_tables import Table, audited, integral, open_conditions, top, upright
 from support.in_process import heavytop
 
@@ -294,3 +295,11 @@ def test_components_of_gamma_lie_between_minus_1_and_1() -> None:
         assert _verdict(value, [])[0] == verdict
     for value in ("asin(sin(Omega1)) - Omega1", "sqrt(Omega3^2) - Omega3 + 0*Omega1"):
         assert _verdict(value, [], "2 3 4", "1 1 1")[0] == "refuted"
+
+
+@pytest.mark.parametrize("value", ["sqrt(Omega3 - 5)", "log(Omega3)", "asin(Omega3)", "log(Omega3)/Omega3"])
+def test_a_sign_that_a_motion_keeps_is_not_said_to_be_that_of_the_whole_domain(value: str) -> None:
+    report = audited(integral(value, top("2 2 1", "0 0 1")))
+    assert report.verdict == "holds"
+    of_state = [c for row in report.rows for c in row.conditions if c.text.startswith(("Omega3", "-1"))]
+    assert {c.reason for c in of_state} == {KEPT}

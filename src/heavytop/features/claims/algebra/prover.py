@@ -536,8 +536,11 @@ class Prover:
         obstacles = everywhere.obstacle(moving), inner.obstacle(f.attitude)
         continuous = bool(f.values) and not any(obstacles) and not everywhere.obstacle(f.values)
         conditions = []
+        given = {need.expression for need in self._kept_facts(statement)}  # which the field takes as facts
         for need in _sorted(f.needs | f.angle_needs):
             reason = everywhere.discharge(need)
+            if reason == _EVERYWHERE and need.expression in given:
+                reason = KEPT
             if not reason and _is_kept(need.expression, statement) and everywhere.is_met_for_each(need):
                 reason = KEPT
             if not reason and continuous:
