@@ -87,6 +87,12 @@ def test_all_files_are_written_or_none(reports, heavytop, capsys, refused: str, 
         "show old/report.json --markdown old/../old/report.json",
         "export old --to csv --out old/report.json",
         "score rules.toml --html rules.toml",
+        "show old --markdown old/report.json.sha256",
+        "score rules.toml --out scored --html scored/report.json",
+        "propagate --file rules.toml --omega 1,0,0 --quaternion 1,0,0,0 --times 1 --csv rules.toml",
+        "gate --plan rules.toml --markdown rules.toml",
+        "gate --integrator mine.py:solve --html mine.py",
+        "gate --baseline old --out old/../old",
     ],
 )
 def test_what_is_read_is_not_written_over(reports, heavytop, capsys, line: str) -> None:

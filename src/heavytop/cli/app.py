@@ -138,10 +138,10 @@ def require_new(folder: Path) -> None:
 
 
 def require_apart(files: Iterable[Path | None], *read: Path | None) -> None:
-    """Raise InputError if an output file is given twice, or is an input, or the report of an input folder."""
+    """Raise InputError if an output is given twice, or is an input, or of the report in a folder that is one."""
     written = [path for path in files if path is not None]
-    sources = [candidate for path in read if path and written for candidate in (path, path / "report.json")]
-    used = {absolute(source).resolve() for source in sources if source.is_file()}
+    sources = [path / name for path in read if path and written for name in ("", "report.json", "report.json.sha256")]
+    used = {absolute(source).resolve() for source in sources}
     for path in written:
         target = absolute(path).resolve()
         if target in used:

@@ -46,8 +46,10 @@ def gate(
     from heavytop.harness.plan import former
     from heavytop.report.render.comparison import comparison
 
-    require_apart((markdown, junit, html), baseline, out, policy)
     trusted, fresh, rules = absolute(baseline), absolute(out), policy_of(plan, policy)
+    require_apart((out,), baseline)
+    code = Path(integrator.partition(":")[0]) if integrator else None
+    require_apart((markdown, junit, html), baseline, out, rules, Path(plan), code)
     command_line = join(["heavytop", *sys.argv[1:], "--bless"])
 
     def make_room(folder: Path) -> None:

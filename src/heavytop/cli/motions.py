@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Protocol, get_args, 
 
 import typer
 
-from heavytop.cli.app import Json, command, numbers, print_json, show_on_terminal, writing
+from heavytop.cli.app import Json, command, numbers, print_json, require_apart, show_on_terminal, writing
 from heavytop.cli.output import reaching, say, say_former, watched
 from heavytop.errors import ExitCode, InputError, options_named
 from heavytop.features import FEATURES
@@ -143,6 +143,8 @@ class _Request:
         self.files = {name: options[name] for name in _AS}
         self.case, self.json = options["case"], options["json"]
         require_one_output(self.files, self.json)
+        written = [path for path in self.files.values() if path != _SCREEN]
+        require_apart(written, Path(options["file"]) if options["file"] else None)
         data = {name: options[name] for name in _DATA}
         self.top, self.start, self.system = _motion(data, self.case, options["system"], options["normalize"])
         self.outputs = _outputs(options["show"], options["point"], options["pivot"])

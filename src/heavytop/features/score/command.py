@@ -64,7 +64,7 @@ def score(
     if out is not None:
         out = absolute(out)
         require_new(out)
-    require_apart((html,), trajectory)
+    require_apart((html,), trajectory, out)
     page = None if html is None else absolute(html)
     motion, needed = read_trajectory(trajectory, case, require=require, normalize=normalize)
     for warning in motion.warnings():
