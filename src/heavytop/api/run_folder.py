@@ -184,6 +184,8 @@ def prepare(
     workers = arguments.count(workers, "workers")
     if workers is not None and scheduler is not None:
         raise InputError("--workers are processes here, --scheduler has its own.", "Give one of them.")
+    if not save_every >= 0:
+        raise InputError(f"save_every must be 0 or more; got {save_every}.", "Give seconds, such as 10.")
     if resume and out is None:
         raise InputError("--resume needs to know what to resume.", "Give the folder with --out.")
     identity = {"name": loaded.name, "sha256": digest, "seed": str(seed)}

@@ -259,14 +259,9 @@ class Body:
         about: str | None = None,
         rotor: Iterable[Any] | None = None,
     ) -> None:
-        data = {"mass": _number(mass, "mass"), "gravity": _number(gravity, "gravity")}
+        data = {"mass": _number(mass, "mass"), "gravity": magnitude_of_gravity(gravity)}
         if data["mass"] <= 0:
             raise InputError(f"mass = {shown(data['mass'])} is not positive.", "Give the mass of the body.")
-        if data["gravity"] < 0:
-            raise InputError(
-                f"gravity = {shown(data['gravity'])} is negative.",
-                "Give its size, such as 9.81: gravity points down; e_z, or the axis named by up, points up.",
-            )
         centre_vector = vector(centre, "centre")
         inertia_tensor = _tensor(inertia)
         to_pivot = _about(about, centre_vector) == CENTRE
@@ -376,6 +371,17 @@ class Frame:
 
 def _texts(values: Vector) -> str:
     return f"({', '.join(repr(exact_text(value)) for value in values)})"
+
+
+def magnitude_of_gravity(value: Given) -> Fraction:
+    """The acceleration of gravity; raises InputError for a negative one."""
+    magnitude = _number(value, "gravity")
+    if magnitude < 0:
+        raise InputError(
+            f"gravity = {shown(magnitude)} is negative.",
+            "Give its size, such as 9.81: gravity points down; e_z, or the axis named by up, points up.",
+        )
+    return magnitude
 
 
 def _number(value: Given, what: str) -> Fraction:

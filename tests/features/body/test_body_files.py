@@ -240,6 +240,14 @@ def test_usd_in_binary_in_packages_and_in_instances(tmp_path: Path) -> None:
         assert says in run.stderr and "Error in '" not in run.stderr  # noqa: PT018
 
 
+@pytest.mark.parametrize(("gravity", "said"), [("-1", "is negative"), ("nan", "not a finite number")])
+def test_a_table_of_a_plan_has_a_gravity_that_a_plan_takes(tmp_path: Path, gravity: str, said: str) -> None:
+    (tmp_path / "arm.urdf").write_text(urdf(["1", "2", "2.5"]))
+    refused = heavytop("body", tmp_path / "arm.urdf", "--gravity", gravity)
+    assert (refused.returncode, refused.stdout) == (2, "")
+    assert said in refused.stderr
+
+
 def test_several_links_want_a_name(tmp_path: Path) -> None:
     path = tmp_path / "a.urdf"
     path.write_text(urdf(SIX).replace("</robot>", urdf(SIX).partition('<link name="base"/>')[2].replace("arm", "hand")))

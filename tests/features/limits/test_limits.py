@@ -121,6 +121,8 @@ def test_the_command_line_says_the_same(tmp_path: Path) -> None:
     assert set(json.loads(known.stdout)["between"]["errors"]) == {"slerp", "linear", "hermite", "lagrange"}
     assert heavytop(*asked, "--within", "1").returncode == 2
     assert heavytop("power", "--until", "1", "--tolerance", "1").returncode == 2
+    for of_file in (("--gravity", "3"), ("--omega", "1,2,3"), ("--quaternion", "0,1,0,0"), ("--link", "arm")):
+        assert heavytop("power", "--case", "lagrange", "--until", "1", "--tolerance", "1", *of_file).returncode == 2
 
 
 def test_pictures_show_each_fault_each_method_and_each_axis() -> None:

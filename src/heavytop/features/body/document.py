@@ -11,7 +11,7 @@ from typing import Any
 
 from heavytop.precision import Vector, decimal_text
 from heavytop.report.render.text import wrapped
-from heavytop.top.bodies import CENTRE, PrincipalAxes, principal_axes
+from heavytop.top.bodies import CENTRE, PrincipalAxes, magnitude_of_gravity, principal_axes
 from heavytop.top.body_files import BodyInFile
 from heavytop.top.equations import HEAVY_TOP, Parameters
 from heavytop.top.inertia_slips import MassProperties, Slip, realisable, six_of, slips
@@ -148,7 +148,10 @@ def assess(body: BodyInFile, pivot: Vector | None = None, gravity: str | None = 
     gravity: of the table of a plan; None: that of the file.
     """
     about_pivot = body.about(pivot)
-    gravity = _decimal(body.gravity_down) if gravity is None else gravity
+    if gravity is None:
+        gravity = _decimal(body.gravity_down)
+    else:
+        magnitude_of_gravity(gravity)
     return BodyAssessment(
         body.name, about_pivot, realisable(about_pivot.central, about_pivot.slack), tuple(slips(about_pivot)), gravity
     )

@@ -42,6 +42,11 @@ def power(
     if (case is None) == (file is None):
         raise InputError("Exactly one of --case and --file must be given.", "`heavytop list` shows the cases.")
     if case is not None:
+        if (link, gravity, omega, quaternion) != (None, "9.81", None, "1,0,0,0"):
+            raise InputError(
+                "The case has a start and gravity of its own.",
+                "Give --link, --gravity, --omega and --quaternion with --file.",
+            )
         known = case_named(case)
         top, start, system = known.body or known.top, known.given_start or known.start, known.system.name
     else:
