@@ -205,7 +205,7 @@ def test_a_body_is_compared_with_a_case_at_its_own_scale(size: Fraction, changed
         (table() + "3,1,1,1,0,0,abc\n", "Line 7, gamma3: 'abc' is not a finite number"),
         ("# centre: 0, 0, 0,5\n" + table(), "centre must be 3 numbers; got '0, 0, 0,5'"),
         ("# inertia: 2,5;2,5;1,5\n" + table(), "inertia must be 3 numbers; got '2,5;2,5;1,5'"),
-        (HEADER + "\n" + "1,2,3,4,5,6,7\n" * 300_000, "300001 states are too many.*"),
+        (HEADER + "\n" + "1,2,3,4,5,6,7\n" * 300_000, "300001 lines are too many.*"),
         (b"t,\0", "holds a byte 0"),
     ],
 )
@@ -287,3 +287,16 @@ def test_what_is_of_another_quantity_is_left_out() -> None:
     found = header(["t", *(f"omega{k}" for k in "123"), *(f"gamma{k}" for k in "123"), *others])
     assert found.others == tuple(others)
     assert set(header(["t", "w [-]", "x [mm]", "y [mm]", "z [mm]"]).places) == {"position"}
+
+
+@pytest.mark.parametrize(
+    ("header", "said"),
+    [
+        ("t [h];omega1;omega2;omega3;gamma1;gamma2;gamma3", "t in h"),
+        ("t [s];omega1/(rev/s);omega2/(rev/s);omega3/(rev/s);gamma1;gamma2;gamma3", "omega in rev/s"),
+        ("t [s];omega1 [rad/s];omega2 [1/s];omega[3];gamma1;gamma2;gamma3", ""),
+    ],
+)
+def test_a_unit_that_is_not_converted_is_named(header: str, said: str, tmp_path: Path) -> None:
+    notes = [note for note in scored(tmp_path, table(header, ";")).notes if "not converted" in note]
+    assert notes == ([f"units of the header are not known, and were not converted: {said}"] if said else [])

@@ -78,6 +78,7 @@ _LENGTHS = ("m", *_METRE)
 _OMEGA = ("omega", "omega_space", "framed")
 _UNITS = {"t": _SECOND, "omega": _RATE, "omega_space": _RATE, "framed": _RATE, "position": _METRE}
 """Units of a header in those of the data: s, rad/s (as multiples of π) and m."""
+_OF_DATA = ("", "1", "-", "s", "sec", "second", "seconds", "m", "1/s", *(f"rad{second}" for second in _A_SECOND))
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +101,7 @@ class Header:
 
     time: the index of t; None where absent.  places: by quantity, the index of each component by its name, in the order
     of the file.  angles: degrees or radians, where the header says so.  others: columns that are not read.
-    units: of t and of quantities, where they differ from those of the data.
+    units: of t and of quantities, where they differ from those of the data.  unknown: units that are not converted.
     """
 
     time: int | None
@@ -108,6 +109,7 @@ class Header:
     angles: str
     others: tuple[str, ...]
     units: Mapping[str, Unit] = field(default_factory=dict)
+    unknown: tuple[str, ...] = ()
 
     def of_state(self) -> dict[str, int]:
         """The indices of t, omega1 to omega3, gamma1 to gamma3 that are present; InputError for one given twice."""
@@ -162,7 +164,8 @@ def header(names: Sequence[str], joint: str = "") -> Header:
         indices["quaternion"] = together
     for name in others:
         _require_no_quantity(name, indices)
-    return Header(time, indices, "".join(angles), tuple(others), _in_one_unit(units))
+    unknown = tuple(text for quantity in units.keys() & _UNITS.keys() for text in _unknown(quantity, units[quantity]))
+    return Header(time, indices, "".join(angles), tuple(others), _in_one_unit(units), unknown)
 
 
 def _quaternion(names: Sequence[str], plain: Sequence[str]) -> dict[str, int]:
@@ -222,6 +225,12 @@ def _in_one_unit(units: Mapping[str, set[Unit]]) -> dict[str, Unit]:
     return {quantity: unit for quantity, unit in unit_of_quantity.items() if unit.size != 1}
 
 
+def _unknown(quantity: str, units: set[Unit]) -> list[str]:
+    """The units of a quantity that are neither those of the data nor converted to them."""
+    names = sorted(unit.name for unit in units if unit.size == 1 and unit.name not in _OF_DATA)
+    return [f"{_words(quantity)} in {name}" for name in names if name not in _AXES and not name.isdigit()]
+
+
 def _with_index(name: str) -> str:
     """omega1 of ``omega[1]`` and R11 of ``R[1][1]`` or ``R(1, 1)``, where the brackets hold a component, not a unit."""
     match = _INDEXED.fullmatch(name)
@@ -279,7 +288,7 @@ def _components(quantity: str, there: set[str], scalar_last: bool, sequence: str
     if quantity == "euler" and there & set("XYZ"):
         if sorted(sequence) != ["X", "Y", "Z"]:
             raise InputError(
-                f"roll, pitch and yaw are of a sequence about three axes, not of {sequence or 'none that is said'}.",
+                f"roll, pitch and yaw need a sequence about three axes; got {sequence or 'none'}.",
                 'Give sequence, such as "ZYX", or call the columns euler1, euler2, euler3.',
             )
         return list(sequence)

@@ -79,7 +79,7 @@ def read_table(text: str, started: bool = False) -> tuple[dict[str, Any], list[s
     if "\0" in text:
         raise InputError("A table must be text; this holds a byte 0.", REMEDY)
     if text.count("\n") > 2 * MOST_STATES:
-        raise too_many(text.count("\n"))
+        raise too_many(text.count("\n"), "lines")
     keys, comments, lines, body = _lines(text)
     if not body:
         raise _no_header([])
@@ -104,8 +104,10 @@ def read_table(text: str, started: bool = False) -> tuple[dict[str, Any], list[s
         cells, lines = [cells[i] for i in kept], [lines[i] for i in kept]
         notes += noted
     units = {"omega" if name == "framed" else name: unit.name for name, unit in meaning.units.items()}
-    in_units = [f"{name} in {unit}" for name, unit in units.items() if name != "position"]
+    in_units = [f"{name} is in {unit}" for name, unit in units.items() if name != "position"]
     notes += [f"as the header says, {', '.join(in_units)}"] if in_units else []
+    if meaning.unknown:
+        notes.append(f"units of the header are not known, and were not converted: {', '.join(sorted(meaning.unknown))}")
     columns: dict[str, Any]
     if meaning.time is not None and (meaning.units or observed_columns.is_more_than_states(meaning)):
         unused = [*meaning.others, *(names[place] for place in _parts(meaning))]

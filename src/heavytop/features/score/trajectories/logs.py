@@ -250,7 +250,7 @@ def with_quaternion(names: Sequence[str]) -> list[str]:
 
 
 def _repeats(count: int) -> list[str]:
-    return [f"{count} rows that repeat the one before are left out"] if count else []
+    return [f"rows that repeat the one before are left out: {count}"] if count else []
 
 
 def of_rodrigues(s: Sequence[Fraction]) -> tuple[Fraction, ...]:

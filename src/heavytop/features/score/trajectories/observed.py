@@ -318,11 +318,11 @@ def require_states(times: list[Fraction], rows: list[Any]) -> None:
         raise too_many(len(times))
 
 
-def too_many(count: int) -> InputError:
-    """Error text for too many states."""
+def too_many(count: int, what: str = "states") -> InputError:
+    """Error text for too many states, or for lines that must hold too many."""
     every = -(-count // MOST_STATES)
     return InputError(
-        f"{count} states are too many to score.", f"Give at most {MOST_STATES} of them, such as one row in {every}."
+        f"{count} {what} are too many to score.", f"Give at most {MOST_STATES} states, such as one row in {every}."
     )
 
 
