@@ -3,6 +3,7 @@
 import json
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -151,6 +152,16 @@ def test_show_and_compare_print_for_people(finished: Path) -> None:
     assert compared.stdout.startswith("Verdict: same (")
 
 
+def test_a_command_that_is_printed_can_be_pasted(finished: Path, tmp_path: Path) -> None:
+    shutil.copytree(finished / "one", tmp_path / "a b")
+    assert "heavytop show 'a b' --full" in run("show", "a b", cwd=tmp_path).stdout
+
+
+def test_checkpoints_are_not_seconds_of_nan_apart(tmp_path: Path) -> None:
+    refused = run("run", "--plan", "smoke", "--out", "x", "--save-every", "nan", cwd=tmp_path)
+    assert (refused.returncode, "save_every must be 0 or more; got nan" in refused.stderr) == (2, True)
+
+
 def test_rows_as_parquet_come_with_the_run_or_from_its_report(finished: Path, tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
     done = run("show", str(finished / "one"), "--parquet", "one.parquet", cwd=tmp_path)
@@ -182,7 +193,7 @@ def test_compare_and_show_refuse_what_is_no_report(finished: Path) -> None:
         assert done.returncode == 2
         assert "heavytop: " in done.stderr
         assert "Traceback" not in done.stderr
-    assert "Name one of the reports in it: one, two" in run("show", ".", cwd=finished).stderr
+    assert "Name one of the reports in .: one, two" in run("show", ".", cwd=finished).stderr
     (finished / "motion.csv").write_text("t,omega1\n")
     assert "`heavytop score motion.csv` reads a trajectory" in run("show", "motion.csv", cwd=finished).stderr
 

@@ -223,3 +223,10 @@ def test_a_message_about_a_fraction_of_many_digits_takes_no_time() -> None:
     began = time.process_time()
     assert shown(1 - Fraction(1, 3**600_000)) == "1"
     assert time.process_time() - began < 1  # a minute if all digits are written first
+
+
+def test_a_decimal_point_is_asked_for_where_a_comma_stands() -> None:
+    for text, asked in (("2,5", True), ("٣", False)):
+        with pytest.raises(InputError, match="not a finite number") as refused:
+            exact(text)
+        assert ("Write a decimal point" in refused.value.remedy) is asked

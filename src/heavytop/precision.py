@@ -234,6 +234,15 @@ def six_digits(value: Fraction) -> str:
     return f"{float(decimal_text(value, 6)):.6g}"
 
 
+def distinct_digits(one: Fraction, other: Fraction) -> tuple[str, str]:
+    """Two numbers that differ, for a sentence: to six digits, or to as many as it takes to see that they differ."""
+    texts, digits = (six_digits(one), six_digits(other)), 6
+    while texts[0] == texts[1]:
+        digits += 1
+        texts = plain_decimal(one, digits), plain_decimal(other, digits)
+    return texts
+
+
 def plain_decimal(value: Fraction, digits: int) -> str:
     """A decimal of at most ``digits`` digits, without trailing zeros."""
     text = decimal_text(value, digits)
@@ -292,7 +301,7 @@ def _from_decimal(text: str, original: str) -> Fraction:
     match = _DECIMAL.fullmatch(text)
     if not match or not text.isascii():
         with_point = text.replace(",", ".", 1)
-        remedy = f"Write a decimal point: {with_point}." if _DECIMAL.fullmatch(with_point) else _REMEDY
+        remedy = f"Write a decimal point: {with_point}." if "," in text and _DECIMAL.fullmatch(with_point) else _REMEDY
         raise InputError(f"{quoted(original)} is not a finite number.", remedy)
     exponent = match[3].lstrip("eE+-").lstrip("0") if match[3] else ""
     if len(exponent) > len(str(_MAX_TEXT)) or int(exponent or 0) > _MAX_TEXT:
@@ -572,11 +581,9 @@ MOST_MEMBERS = 10_000_000
 
 def vector(values: Iterable[Any], what: str) -> Vector:
     """Three exact rationals of components that :func:`exact` reads; raises InputError otherwise."""
-    parts = ordered(values, what, "Give three numbers, one for each principal axis: x,y,z.")
+    parts = ordered(values, what, "Give three numbers: x,y,z.")
     if len(parts) != 3:
-        raise InputError(
-            f"{argument(what)} has {len(parts)} numbers.", "Give three, one for each principal axis: x,y,z."
-        )
+        raise InputError(f"{argument(what)} has {len(parts)} numbers.", "Give three: x,y,z.")
     try:
         first, second, third = (exact(part) for part in parts)
     except InputError as error:

@@ -375,7 +375,7 @@ def test_sigterm_ends_a_run_with_exit_143_and_it_goes_on(quick: Path) -> None:
     process.send_signal(signal.SIGTERM)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 143
-    assert "--resume goes on" in errors
+    assert "--resume continues" in errors
     assert "Traceback" not in errors
     assert (out / "rows.jsonl").exists()
     assert resumed(quick, out).returncode == 0

@@ -37,6 +37,9 @@ def test_moments_that_no_body_has_are_a_warning_only() -> None:
         "I3 = 3 exceeds the sum 2 of the other two: no rigid body has such moments."
     ]
     assert HeavyTop((1, 1, 2), 1, (0, 0, 1)).warnings() == []
+    assert HeavyTop(("3.0000000000000005", 2, 1), 1, (0, 0, 1)).warnings() == [
+        "I1 = 3.0000000000000005 exceeds the sum 3 of the other two: no rigid body has such moments."
+    ]
 
 
 def test_gamma_off_the_sphere_is_refused_and_says_by_how_much() -> None:

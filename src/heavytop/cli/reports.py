@@ -6,6 +6,7 @@ import signal
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from shlex import quote
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -164,7 +165,7 @@ def _print(report: Path, full: bool, json: bool) -> None:
     if not full:
         loaded = store.read(report, KINDS)
         print(brief(loaded, loaded.rows, KINDS))
-        print(f"\nEvery row: heavytop show {report} --full")
+        print(f"\nEvery row: heavytop show {quote(str(report))} --full")
         return
     streamed = store.read_brief(report, KINDS)
     if len(streamed.rows) > overview.MOST_LISTED:
@@ -258,9 +259,10 @@ def run(
     ended = measured(planned)
     print(ended.summary)
     page = directory / PAGE
-    print(f"\nMade in {perf_counter() - began:.0f} s. Every row: heavytop show {directory} --full")
+    folder = quote(str(directory))
+    print(f"\nMade in {perf_counter() - began:.0f} s. Every row: heavytop show {folder} --full")
     print(f"Report: {directory / REPORT}")
-    print(f"Page:   {page if page.exists() else f'none for so many rows; `heavytop show {directory} --html FILE`'}")
+    print(f"Page:   {page if page.exists() else f'none for so many rows; `heavytop show {folder} --html FILE`'}")
     return ExitCode.GOOD if ended.good else ExitCode.INCOMPLETE
 
 
@@ -273,7 +275,8 @@ def measured(planned: PlannedRun) -> FinishedRun:
         with _stopped_by_signals(), Progress(planned.tasks, KINDS, planned.workers) as advance:
             return planned.measure(advance, advance.begin)
     except KeyboardInterrupt as stop:
-        kept = f"finished rows are kept: `heavytop run` with the same plan, --out {planned.directory} --resume goes on"
+        folder = quote(str(planned.directory))
+        kept = f"finished rows are kept: `heavytop run` with the same plan and --out {folder} --resume continues"
         say(f"interrupted; {kept if (planned.directory / ROWS).exists() else 'no row was finished'}")
         raise typer.Exit(ExitCode.TERMINATED if isinstance(stop, _Terminated) else ExitCode.INTERRUPTED) from None
 

@@ -17,6 +17,7 @@ from heavytop.precision import (
     Vector,
     cache_last_call,
     decimal_text,
+    distinct_digits,
     dot,
     exact,
     exact_text,
@@ -24,7 +25,6 @@ from heavytop.precision import (
     physical,
     round_to,
     shown,
-    six_digits,
     vector,
 )
 from heavytop.top.attitude import Attitude, rotated, transposed
@@ -110,9 +110,9 @@ class HeavyTop:
         for axis, value in enumerate(self.inertia):
             others = sum(self.inertia) - value
             if value > others:
+                moment, most = distinct_digits(value, others)
                 sentences.append(
-                    f"I{axis + 1} = {six_digits(value)} exceeds the sum {six_digits(others)} of the other two: "
-                    "no rigid body has such moments."
+                    f"I{axis + 1} = {moment} exceeds the sum {most} of the other two: no rigid body has such moments."
                 )
         return sentences
 

@@ -12,6 +12,7 @@ import msgspec
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from heavytop.display import plural
 from heavytop.features.score.diagnose.samples import AS_AT_START, VARIES
 from heavytop.features.score.diagnose.search import FLOOR, Diagnosis
 from heavytop.features.score.measurement import Assessment, direction, passed
@@ -67,7 +68,7 @@ _CONVENTION_SENTENCES = {
     "extrinsic": "The Euler angles are about axes of space (extrinsic): those of {sequence}, one after the other",
     "angles_negated": "The Euler angles have the other sign",
     "angles_of_inverse": "The Euler angles are those of the inverse rotation, from space to body",
-    "omega_frame": "Ω is in the axes of {frame}: {key}",
+    "omega_frame": "Ω is in {frame} axes: {key}",
     "omega_reversed": "Ω has the other sign",
     "omega_scaled": "Ω is {factor} times what fits",
     "momentum": "The columns of Ω are the angular momentum M = I Ω",
@@ -431,7 +432,7 @@ def sizes(row: Row) -> list[list[Cell]]:
 def score_text(assessment: Assessment) -> RenderableType:
     """Digits right, distance from the known motion, drift of every first integral, what explains the error."""
     row = assessment.row
-    numbers = Lines(["", f"largest over {row.samples} samples", "rms", "final"], sizes(row))
+    numbers = Lines(["", f"largest over {plural(row.samples, 'sample')}", "rms", "final"], sizes(row))
     about = f"{row.case}: {row.integrator}, {row.system.replace('_', ' ')} in {row.precision} ({row.bits} bits)"
     parts: list[RenderableType] = [Text(line) for line in answer(row, assessment.peer)]
     parts += [Text(), numbers, Text(), *_wrapped(about), *_wrapped(f"Reference: {row.reference.brief}.")]

@@ -16,7 +16,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from heavytop.display import printable
+from heavytop.display import plural, printable
 from heavytop.measure.certify import bits_of
 from heavytop.measure.derivatives import PARAMETERS, STARTS, Ball, Derivatives
 from heavytop.measure.motion import Motion
@@ -345,7 +345,7 @@ def motion_text(motion: Motion, table: MotionTable) -> RenderableType:
     precision = run.problem.precision
     head = f"{run.problem.system.name} in {precision.name} ({precision.bits} bits): {run.outcome.message}"
     if run.order:  # some peers report neither
-        head += f", {run.steps} steps of order {run.order}"
+        head += f", {plural(run.steps, 'step')} of order {run.order}"
     parts: list[RenderableType] = [Text(head), *_attitude_at_start(table)]
     parts += _at_each_time(table)
     if not motion.complete:
@@ -367,7 +367,7 @@ def motion_text(motion: Motion, table: MotionTable) -> RenderableType:
 
 def reference_text(reference: Reference, table: MotionTable) -> RenderableType:
     """Proven states and further requested outputs, with the radius of each number."""
-    parts: list[RenderableType] = [Text(f"{reference.system}, {reference.digits} digits; {reference.method}")]
+    parts: list[RenderableType] = [Text(f"{reference.system}, {plural(reference.digits, 'digit')}; {reference.method}")]
     if reference.attitude_method not in (None, reference.method):
         parts.append(Text(f"attitude: {reference.attitude_method}"))
     parts += [Text(reference.stability.text())] if reference.stability else []

@@ -191,11 +191,15 @@ def _read(path: Path, kind: type[_Content]) -> tuple[Path, _Content]:
             content = gzip.decompress(content)
     except (OSError, EOFError, zlib.error) as error:
         reports = sorted(entry.parent.name for entry in file.parent.glob(f"*/{FILE}*"))
-        remedy = f"Name one of the reports in it: {', '.join(dict.fromkeys(reports))}." if reports else REMEDY
+        remedy = (
+            f"Name one of the reports in {str(file.parent)[:_NAME]}: {', '.join(dict.fromkeys(reports))}."
+            if reports
+            else REMEDY
+        )
         raise InputError(f"{str(file)[:_NAME]} holds no report: {why(error)}.", remedy) from None
     if not content.lstrip().startswith(b"{"):
         remedy = f"`heavytop score {file}` reads a trajectory." if file.suffix == ".csv" else REMEDY
-        raise InputError(f"{str(file)[:_NAME]} is not a whole report: it is not JSON.", remedy)
+        raise InputError(f"{str(file)[:_NAME]} is not a whole report: it is not a JSON object.", remedy)
     with ThreadPoolExecutor(1) as thread:
         digest = thread.submit(_has_its_digest, file, content)
         try:
