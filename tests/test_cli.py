@@ -27,7 +27,7 @@ COMMAND = [sys.executable, "-m", "heavytop"]
 
 
 STEPS = '[[measure]]\nkind = "local_error"\ncases = ["euler"]\nprecisions = ["double"]\nhorizon = "1"\n'
-run = in_process.heavytop
+run, printed, refused = in_process.heavytop, in_process.printed, in_process.refused
 
 
 @pytest.fixture(scope="module")
@@ -45,9 +45,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_propagate_gives_full_precision_strings_that_meet_the_reference() -> None:
     given = VECTORS[0]
-    done = run("propagate", *options(times="1,8"), "--precision", "quad", "--json")
-    assert done.returncode == 0, done.stderr
-    answer = json.loads(done.stdout)
+    answer = json.loads(printed("propagate", *options(times="1,8"), "--precision", "quad", "--json"))
     assert [answer[key] for key in ("precision", "bits", "system", "outcome")] == ["quad", 113, "heavy_top", "success"]
     assert len(answer["times"]) == len(answer["states"]) == 2
     assert answer["steps"] > 0
@@ -56,12 +54,9 @@ def test_propagate_gives_full_precision_strings_that_meet_the_reference() -> Non
 
 
 def test_propagate_prints_for_people_and_carries_the_attitude() -> None:
-    done = run("propagate", *options(), "--attitude")
-    assert done.returncode == 0
-    assert "reached every time asked for" in done.stdout
-    assert "ψ" in done.stdout
-    assert "energy" in done.stdout
-    answer = json.loads(run("propagate", *options(), "--attitude", "--json").stdout)
+    text = printed("propagate", *options(), "--attitude")
+    assert all(word in text for word in ("reached every time asked for", "ψ", "energy"))
+    answer = json.loads(printed("propagate", *options(), "--attitude", "--json"))
     assert len(answer["states"][0]) == 6
     assert len(answer["attitude"][0]) == len(answer["angles"][0]) == 3
     assert "drift_xi_squared_max" in answer["metrics"]
@@ -74,8 +69,8 @@ def test_a_run_that_stops_early_is_incomplete_and_keeps_what_it_reached() -> Non
     assert answer["outcome"] == "step_limit"
     assert len(answer["states"]) == len(answer["times"]) == 2
     assert "stopped" in run("propagate", *options(times="1,2,900"), "--max-steps", "40").stdout
-    done = run("propagate", *options(omega="1e140,1e140,1", times="8e-140"), "--json")
-    assert (done.returncode, json.loads(done.stdout)["outcome"]) == (0, "success")
+    fast = printed("propagate", *options(omega="1e140,1e140,1", times="8e-140"), "--json")
+    assert json.loads(fast)["outcome"] == "success"
 
 
 @pytest.mark.parametrize(
@@ -101,17 +96,12 @@ def test_a_run_that_stops_early_is_incomplete_and_keeps_what_it_reached() -> Non
     ],
 )
 def test_bad_input_gets_a_clear_error_and_exit_2(changes, more, message) -> None:
-    done = run("propagate", *options(**changes), *more, "--json")
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert done.stdout == ""
-    assert "Traceback" not in done.stderr
+    assert message in refused("propagate", *options(**changes), *more, "--json")
 
 
 def test_normalize_moves_gamma_onto_the_sphere() -> None:
-    done = run("propagate", *options(gamma="1,1,0"), "--normalize", "--json")
-    assert done.returncode == 0
-    gamma = [Fraction(v) for v in json.loads(done.stdout)["states"][0][3:]]
+    answer = json.loads(printed("propagate", *options(gamma="1,1,0"), "--normalize", "--json"))
+    gamma = [Fraction(v) for v in answer["states"][0][3:]]
     assert abs(sum(g * g for g in gamma) - 1) < Fraction(1, 10**13)
 
 
@@ -138,41 +128,34 @@ def test_two_runs_of_a_plan_are_the_same_but_for_timings(finished: Path) -> None
             row.pop("seconds", None)
     assert one["rows"] == two["rows"]
     assert {row["outcome"] for row in one["rows"]} == {"success"}
-    done = run("compare", "one", "two", "--json", cwd=finished)
-    assert done.returncode == 0
-    assert json.loads(done.stdout)["verdict"] == "same"
+    assert json.loads(printed("compare", "one", "two", "--json", cwd=finished))["verdict"] == "same"
 
 
 def test_show_and_compare_print_for_people(finished: Path) -> None:
-    shown = run("show", "one", "--full", cwd=finished)
-    assert shown.returncode == 0
-    assert "drift of the first integrals" in " ".join(shown.stdout.split())
-    assert "kovalevskaya" in shown.stdout
-    compared = run("compare", "one", "two", cwd=finished)
-    assert compared.stdout.startswith("Verdict: same (")
+    shown = printed("show", "one", "--full", cwd=finished)
+    assert "drift of the first integrals" in " ".join(shown.split())
+    assert "kovalevskaya" in shown
+    assert printed("compare", "one", "two", cwd=finished).startswith("Verdict: same (")
 
 
 def test_a_command_that_is_printed_can_be_pasted(finished: Path, tmp_path: Path) -> None:
     shutil.copytree(finished / "one", tmp_path / "a b")
-    assert "heavytop show 'a b' --full" in run("show", "a b", cwd=tmp_path).stdout
+    assert "heavytop show 'a b' --full" in printed("show", "a b", cwd=tmp_path)
 
 
 def test_checkpoints_are_not_seconds_of_nan_apart(tmp_path: Path) -> None:
-    refused = run("run", "--plan", "smoke", "--out", "x", "--save-every", "nan", cwd=tmp_path)
-    assert (refused.returncode, "save_every must be 0 or more; got nan" in refused.stderr) == (2, True)
+    said = refused("run", "--plan", "smoke", "--out", "x", "--save-every", "nan", cwd=tmp_path)
+    assert "save_every must be 0 or more; got nan" in said
 
 
 def test_rows_as_parquet_come_with_the_run_or_from_its_report(finished: Path, tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
-    done = run("show", str(finished / "one"), "--parquet", "one.parquet", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    printed("show", finished / "one", "--parquet", "one.parquet", cwd=tmp_path)
     assert (tmp_path / "one.parquet").read_bytes() == (finished / "two" / "rows.parquet").read_bytes()
     assert not (finished / "one" / "rows.parquet").exists()
-    refused = run("show", str(finished / "one"), "--parquet", "report.json", cwd=tmp_path)
-    assert refused.returncode == 2
-    assert "ends in .parquet" in refused.stderr
-    refused = run("show", str(finished / "one"), "--parquet", "x.parquet", "--html", "./x.parquet", cwd=tmp_path)
-    assert (refused.returncode, "is named twice" in refused.stderr) == (2, True)
+    assert "ends in .parquet" in refused("show", finished / "one", "--parquet", "report.json", cwd=tmp_path)
+    twice = ("--parquet", "x.parquet", "--html", "./x.parquet")
+    assert "is named twice" in refused("show", finished / "one", *twice, cwd=tmp_path)
     assert not (tmp_path / "x.parquet").exists()
 
 
@@ -180,22 +163,18 @@ def test_parquet_without_pyarrow_is_refused_before_anything_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    refused = run("run", "--plan", "smoke", "--out", "out", "--parquet", cwd=tmp_path)
-    assert refused.returncode == 2
-    assert "pip install 'heavytop[parquet]'" in refused.stderr
+    said = refused("run", "--plan", "smoke", "--out", "out", "--parquet", cwd=tmp_path)
+    assert "pip install 'heavytop[parquet]'" in said
     assert not (tmp_path / "out").exists()
 
 
 def test_compare_and_show_refuse_what_is_no_report(finished: Path) -> None:
     (finished / "cut.json").write_text((finished / "one" / "report.json").read_text()[:500])
     for arguments in (["show", "nowhere"], ["show", "cut.json"], ["compare", "one", "cut.json"], ["show", "plan.toml"]):
-        done = run(*arguments, cwd=finished)
-        assert done.returncode == 2
-        assert "heavytop: " in done.stderr
-        assert "Traceback" not in done.stderr
-    assert "Name one of the reports in .: one, two" in run("show", ".", cwd=finished).stderr
+        assert "heavytop: " in refused(*arguments, cwd=finished)
+    assert "Name one of the reports in .: one, two" in refused("show", ".", cwd=finished)
     (finished / "motion.csv").write_text("t,omega1\n")
-    assert "`heavytop score motion.csv` reads a trajectory" in run("show", "motion.csv", cwd=finished).stderr
+    assert "`heavytop score motion.csv` reads a trajectory" in refused("show", "motion.csv", cwd=finished)
 
 
 def test_a_folder_with_other_content_is_left_alone(tmp_path: Path) -> None:
@@ -204,9 +183,7 @@ def test_a_folder_with_other_content_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "out" / "precious.txt").write_text("keep me")
     (tmp_path / "file").write_text("")
     for out, message in (("out", "already holds precious.txt"), ("file", "is a file")):
-        done = run("run", "--plan", "plan.toml", "--out", out, cwd=tmp_path)
-        assert done.returncode == 2
-        assert message in done.stderr
+        assert message in refused("run", "--plan", "plan.toml", "--out", out, cwd=tmp_path)
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["precious.txt"]
 
 
@@ -220,17 +197,14 @@ def test_a_folder_with_other_content_is_left_alone(tmp_path: Path) -> None:
 )
 def test_a_bad_run_writes_nothing(tmp_path: Path, arguments: list[str], message: str) -> None:
     (tmp_path / "bad.toml").write_text('name = "bad"\nmeasure = []\nsurprise = 1\n')
-    done = run("run", *arguments, cwd=tmp_path)
-    assert done.returncode == 2
-    assert message in done.stderr
+    assert message in refused("run", *arguments, cwd=tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["bad.toml"]
 
 
 def test_what_a_killed_run_left_is_not_written_over(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "rows.jsonl").touch()
-    refused = run("run", "--plan", "smoke", "--out", "out", cwd=tmp_path)
-    assert (refused.returncode, "--resume" in refused.stderr) == (2, True)
+    assert "--resume" in refused("run", "--plan", "smoke", "--out", "out", cwd=tmp_path)
 
 
 def seconds_so_far(pid: int) -> float:
@@ -275,10 +249,8 @@ def test_the_version_is_that_of_the_package_with_its_commit() -> None:
 
 
 def test_help_lists_the_commands_and_loads_nothing_heavy() -> None:
-    done = run("--help")
-    assert done.returncode == 0
-    for name in ("run", "propagate", "compare", "score", "show", "list"):
-        assert name in done.stdout
+    text = printed("--help")
+    assert all(name in text for name in ("run", "propagate", "compare", "score", "show", "list"))
     heavy = {"heyoka", "numpy", "flint", "matplotlib", "sympy", "distributed"}
     said = f"atexit.register(lambda: print({heavy} & sys.modules.keys()))"
     done = python("-c", f"import atexit, sys; from heavytop.__main__ import main; {said}; main()", "--help")
@@ -286,17 +258,14 @@ def test_help_lists_the_commands_and_loads_nothing_heavy() -> None:
 
 
 def test_list_names_cases_plans_systems_and_formats() -> None:
-    done = run("list")
-    assert done.returncode == 0
-    for word in ("ershkov-partial-6", "kovalevskaya", "default", "gyrostat", "real:BITS", "113 bits", "scipy:DOP853"):
-        assert word in done.stdout
+    words = ("ershkov-partial-6", "kovalevskaya", "default", "gyrostat", "real:BITS", "113 bits", "scipy:DOP853")
+    text = printed("list")
+    assert [word for word in words if word not in text] == []
 
 
 def test_reference_gives_proven_values_that_enclose_the_vectors() -> None:
     given = VECTORS[0]
-    done = run("reference", *options(times="1,8"), "--digits", "60", "--json")
-    assert done.returncode == 0, done.stderr
-    answer = json.loads(done.stdout)
+    answer = json.loads(printed("reference", *options(times="1,8"), "--digits", "60", "--json"))
     assert answer["digits"] == 60
     assert answer["method"].startswith("validated")
     assert len(answer["times"]) == len(answer["states"]) == 2
@@ -308,10 +277,9 @@ def test_reference_gives_proven_values_that_enclose_the_vectors() -> None:
 
 def test_reference_of_the_gyrostat_uses_its_closed_form() -> None:
     given = options(inertia="6,6,1", weight="1", centre="0,15,0", omega="0,0,6", gamma="0,0,1", times="-3")
-    done = run("reference", *given, "--system", "gyrostat", "--digits", "40")
-    assert done.returncode == 0, done.stderr
-    assert "(4.2)-(4.6)" in done.stdout
-    assert "±" in done.stdout
+    text = printed("reference", *given, "--system", "gyrostat", "--digits", "40")
+    assert "(4.2)-(4.6)" in text
+    assert "±" in text
 
 
 @pytest.mark.parametrize(
@@ -327,23 +295,17 @@ def test_reference_of_the_gyrostat_uses_its_closed_form() -> None:
     ],
 )
 def test_reference_refuses_what_it_cannot_prove(changes, more, code, message) -> None:
-    done = run("reference", *options(**changes), *more, "--json")
-    assert done.returncode == code
-    assert message in done.stderr
-    assert done.stdout == ""
-    assert "Traceback" not in done.stderr
+    assert message in refused("reference", *options(**changes), *more, "--json", code=code)
 
 
 def test_a_gate_without_a_baseline_names_the_command_that_makes_it(tmp_path: Path) -> None:
-    asked = ("gate", "--plan", "smoke", "--baseline", "my base")
-    done = run(*asked, cwd=tmp_path)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.endswith(" heavytop gate --plan smoke --baseline 'my base' --bless\n")
+    said = refused("gate", "--plan", "smoke", "--baseline", "my base", cwd=tmp_path)
+    assert said.endswith(" heavytop gate --plan smoke --baseline 'my base' --bless\n")
 
 
 def test_a_gate_of_no_plan_leaves_the_report_of_before(tmp_path: Path) -> None:
     before = tmp_path / ".heavytop" / "new" / "message.txt"
     before.parent.mkdir(parents=True)
     before.write_text("Move the baseline\n")
-    assert run("gate", "--plan", "gaet.toml", "--bless", cwd=tmp_path).returncode == 2
+    refused("gate", "--plan", "gaet.toml", "--bless", cwd=tmp_path)
     assert before.read_text() == "Move the baseline\n"

@@ -43,9 +43,8 @@ def test_messages_and_help_name_pages_that_an_installation_has() -> None:
 
 
 def test_a_page_is_what_its_file_says_and_has_nothing_that_only_the_site_can_show() -> None:
-    done = in_process.heavytop("docs", "score")
-    assert (done.returncode, done.stdout) == (0, (ROOT / "docs" / "score.md").read_text("utf-8"))
-    listed = in_process.heavytop("docs").stdout.splitlines()
+    assert in_process.printed("docs", "score") == (ROOT / "docs" / "score.md").read_text("utf-8")
+    listed = in_process.printed("docs").splitlines()
     assert [line.split()[0] for line in listed] == list(pages.topics())
     for name, title in pages.topics().items():
         assert title

@@ -231,6 +231,22 @@ def test_a_cluster_gives_the_same_rows_as_this_process_even_if_a_worker_is_kille
     assert measured(tasks, 1, cluster, after_first=lambda: kill(worker_pids()[0])) == expected
 
 
+@dask
+def test_a_worker_of_four_threads_gives_the_rows_of_one_process(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    cases, runs = ("euler", "gyrostat", "pendulum", "kovalevskaya"), [("double", "20", 20), ("extended", "9", 9)]
+    tasks = tasks_of(tmp_path, drift(*cases, runs=runs))
+    options = {"n_workers": 1, "threads_per_worker": 4, "processes": False, "dashboard_address": None}
+    before = sys.getswitchinterval()
+    with distributed.LocalCluster(**options, silence_logs="error") as cluster:
+        sys.setswitchinterval(1e-6)
+        try:
+            found = measured(tasks, 1, cluster.scheduler_address)
+        finally:
+            sys.setswitchinterval(before)
+    assert found == measured(tasks, 1)
+
+
 THIRD_PARTY = """
 import os, re, subprocess
 from heavytop.integrate.peers.double import Solved

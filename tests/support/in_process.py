@@ -48,6 +48,21 @@ def heavytop(*arguments: object, cwd: Path | None = None) -> subprocess.Complete
     return subprocess.CompletedProcess(line, code, *texts)
 
 
+def printed(*arguments: object, cwd: Path | None = None) -> str:
+    """What ``heavytop ARGUMENTS``, which succeeds, prints."""
+    done = heavytop(*arguments, cwd=cwd)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def refused(*arguments: object, cwd: Path | None = None, code: int = 2) -> str:
+    """What ``heavytop ARGUMENTS``, which is refused, says on standard error; it prints nothing, and no traceback."""
+    done = heavytop(*arguments, cwd=cwd)
+    assert (done.returncode, done.stdout) == (code, ""), done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stderr
+
+
 @contextmanager
 def _as_before(line: list[str]) -> Iterator[None]:
     """The program's own argv, its handler of Ctrl-C and modules of the test go; all else has to be as it was."""
