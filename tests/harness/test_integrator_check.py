@@ -112,23 +112,22 @@ def test_a_check_that_is_stopped_says_nothing_and_leaves_no_process(tmp_path: Pa
     assert wait_until(lambda: not is_running(int(began.read_text())))
 
 
+CARRIED = """
+import numpy as np
+from dataclasses import replace
+from heavytop.integrate.heyoka.motions import propagate
+
+def solve(top, start, times, precision, *, system, xi=None):
+    run = propagate(top, start, times, precision, system=system, xi=xi)
+    turned = [[1] * 6 + [-1 if LATE else 1] * 3 for t in run.times]
+    return run if xi is None else replace(run, states=np.array(run.states) * turned)
+"""
+
+
 def test_an_attitude_that_is_lost_later_is_seen(tmp_path: Path) -> None:
     """And so is one of every second sample alone."""
     for late in ("float(t) > 1", "float(t) == 1"):
-        (tmp_path / "mine.py").write_text(
-            "import numpy as np\n"
-            "from dataclasses import replace\n"
-            "from heavytop.integrate.heyoka.motions import propagate\n"
-            "def solve(top, start, times, precision, *, system, xi=None):\n"
-            "    run = propagate(top, start, times, precision, system=system, xi=xi)\n"
-            "    if xi is None:\n"
-            "        return run\n"
-            "    states = np.array(run.states)\n"
-            "    for t, y in zip(run.times, states):\n"
-            f"        y[6:] *= -1 if {late} else 1\n"
-            "    return replace(run, states=states)\n",
-            "utf-8",
-        )
+        (tmp_path / "mine.py").write_text(CARRIED.replace("LATE", late), "utf-8")
         contract = integrator_check._Contract(named(f"{tmp_path / 'mine.py'}:solve"))
         part = integrator_check._judged("attitude", contract._attitude)
         assert part.verdict == "violated"

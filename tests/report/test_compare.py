@@ -24,11 +24,6 @@ def with_metric(value: Metric, name: str = "drift_energy_max") -> Row:
     return row(metrics={**row().metrics, name: value})
 
 
-def test_a_report_is_the_same_as_itself() -> None:
-    result = compare(report(row()), report(row()), Policy())
-    assert (result.verdict, result.exit_code) == ("same", 0)
-
-
 def metric(text: str, kind: str = "error") -> Metric:
     """A number, one of its words, or ``<`` and the bound of an unresolved error."""
     if text.startswith("<"):
@@ -209,11 +204,6 @@ def test_worse_outranks_incomparable_and_environments_are_shown() -> None:
     result = compare(old, new, Policy())
     assert result.exit_code == 1
     assert result.environment == [("packages.heyoka", "7", "8")]
-
-
-def test_two_empty_reports_are_refused() -> None:
-    with pytest.raises(InputError, match="nothing to compare"):
-        compare(report(), report(), Policy())
 
 
 def test_a_report_comes_back_from_disk_as_it_was(tmp_path: Path) -> None:

@@ -61,10 +61,6 @@ def test_the_order_of_whole_runs_of_a_method_with_a_memory_leads_too() -> None:
     assert said[-1] == "No other row changed."
 
 
-def test_a_report_against_itself_has_one_sentence() -> None:
-    assert found([row()], [row()]) == ["Nothing changed: 2 metrics are within what is allowed."]
-
-
 def work(steps: int, size: str, drift: str = "", **changes: object) -> Row:
     subject = Subject("computed", "mine:rk5", step=f"1/{steps}")
     metrics = {"error_max": error(size)} | ({"drift_energy_max": error(drift)} if drift else {})

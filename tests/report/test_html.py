@@ -61,13 +61,8 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Page]:
     results = store.read(RESULTS)
     looked_at = [results.rows[4], results.rows[-10]]
     html.write_report(replace(results, rows=[*results.rows[::6], *looked_at]), folder / "results.html")
-    ours = [
-        replace(report, rows=[r for r in report.rows if not is_third_party(r.integrator)])
-        for report in (baseline, candidate)
-    ]
-    baseline, candidate = ours
-    result = compare(baseline, candidate, Policy())
-    (folder / "comparison.html").write_text(html.comparison_page(baseline, candidate, result), "utf-8")
+    two = [replace(r, rows=[o for o in r.rows if not is_third_party(o.integrator)]) for r in (baseline, candidate)]
+    (folder / "comparison.html").write_text(html.comparison_page(*two, compare(*two, Policy())), "utf-8")
     return {path.stem: Page(path) for path in folder.glob("*.html")}
 
 
@@ -110,20 +105,8 @@ def section_of(name: str, report: Report) -> Section | None:
 
 
 def test_the_verdict_comes_first_then_the_sections_in_their_order(pages: dict[str, Page]) -> None:
-    sections = [tags["id"] for tags in pages["report"].all("section")]
-    expected = [
-        "verdict",
-        "digits",
-        "claim-error",
-        "growth",
-        "break-away",
-        "work-precision",
-        "method-growth",
-        "rows",
-        "environment",
-        "reproduce",
-    ]
-    assert sections == expected
+    sections = "verdict digits claim-error growth break-away work-precision method-growth rows environment reproduce"
+    assert [tags["id"] for tags in pages["report"].all("section")] == sections.split()
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -293,13 +276,11 @@ def test_a_comparison_draws_both_and_lists_the_worst_first(pages: dict[str, Page
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_a_comparison_of_a_report_with_itself_says_so(tmp_path: Path) -> None:
+def test_a_comparison_of_a_report_with_itself_says_so() -> None:
     report = full_report()
     report = replace(report, rows=[each for each in report.rows if each.outcome == "success"])
-    (tmp_path / "page.html").write_text(
-        html.comparison_page(report, report, compare(report, report, Policy())), "utf-8"
-    )
-    assert "Every metric of every row is the same." in Page(tmp_path / "page.html").text
+    page = html.comparison_page(report, report, compare(report, report, Policy()))
+    assert "Every metric of every row is the same." in page
 
 
 def test_how_to_reproduce_names_the_plan_only_where_it_is_built_in() -> None:
@@ -347,15 +328,13 @@ def test_the_digits_of_an_integrator_stand_beside_those_of_heyoka() -> None:
     alone = row(case="far", horizon="9000", integrator="mine:rk", metrics={RELATIVE.text: error("1e-2")})
     said = "mine:rk in double: 4.0 of 16 digits right to T = 1000 (euler); heyoka: 10.0."
     assert digits_headline([row(), mine, alone]).text == said
-    said = "heyoka in double: 10.0 of 16 digits right to T = 1000 (euler)."
-    assert digits_headline([row(horizon="10"), row()]).text == said
-    said = "heyoka in double: 10.0 of 16 digits right to T = 1000 (euler, worst of 2)."
-    assert digits_headline([row(), row(case="b")]).text == said
     only = {"solution_error_omega_max": error("1e-5"), "solution_error_gamma_max": error("1e-3")}
-    assert (
-        digits_headline([row(metrics=only)]).text
-        == "heyoka in double: at least 3.0 of 16 digits right to T = 1000 (euler)."
-    )
+    for rows, said in (
+        ([row(horizon="10"), row()], "10.0 of 16 digits right to T = 1000 (euler)."),
+        ([row(), row(case="b")], "10.0 of 16 digits right to T = 1000 (euler, worst of 2)."),
+        ([row(metrics=only)], "at least 3.0 of 16 digits right to T = 1000 (euler)."),
+    ):
+        assert digits_headline(rows).text == f"heyoka in double: {said}"
     assert digits_headline([row(outcome="time_limit")]) is None
 
 
@@ -458,28 +437,19 @@ def test_kinds_that_are_mixed_answer_in_order(default: Report) -> None:
 
 def test_homoclinic_motions_of_others_stand_beside_those_of_heyoka(default: Report) -> None:
     ours = [each for each in default.rows if each.key.kind == "homoclinic" and each.key.case == "delone"]
-    theirs = [replace(each, key=replace(each.key, subject=replace(each.key.subject, name="mine:x"))) for each in ours]
-    late = replace(
-        theirs[0], metrics={"break_away_time": replace(theirs[0].metrics["break_away_time"], value="never", log10=None)}
-    )
-    found = headline_of("homoclinic", [*ours, late])
-    horizon = float(ours[0].horizon)
-    assert (
-        found
-        == f"mine:x stays on delone up to |t| = {horizon:.3g} in double; heyoka to 33.6 in double, 179 in real:237."
-    )
+    theirs = replace(ours[0], key=replace(ours[0].key, subject=replace(ours[0].key.subject, name="mine:x")))
+    never = replace(theirs.metrics["break_away_time"], value="never", log10=None)
+    found = headline_of("homoclinic", [*ours, replace(theirs, metrics={"break_away_time": never})])
+    stays = f"mine:x stays on delone up to |t| = {float(theirs.horizon):.3g} in double"
+    assert found == f"{stays}; heyoka to 33.6 in double, 179 in real:237."
 
 
 def test_local_errors_alone_open_and_fill_their_page() -> None:
-    metrics = {
-        "local_error_ulp_max": error("3.25"),
-        "local_error_ulp_rms": error("1"),
-        "observed_order": Metric("4", 0.6),
-    }
+    metrics = {f"local_error_ulp_{part}": error(size) for part, size in (("max", "3.25"), ("rms", "1"))}
+    metrics["observed_order"] = Metric("4", 0.6)
     mine = replace(row(measure="local_error", integrator="mine:rk", metrics=metrics), order=5)
-    page = html.report_page(
-        Report("", {}, {}, [row(measure="local_error", metrics={"local_error_ulp_max": error("9")}), mine])
-    )
+    ours = row(measure="local_error", metrics={"local_error_ulp_max": error("9")})
+    page = html.report_page(Report("", {}, {}, [ours, mine]))
     said = "euler mine:rk in double: one step errs by at most 7.2e-16; order 4 in single steps."
     assert f">{said}</h2>" in re.sub("<span.*?>|</span>", "", page)
     assert all(f">{cell}</td>" in page for cell in ("3.25", "4", "5"))
