@@ -36,6 +36,10 @@ def random_spherical(seed):
     return SphericalTop(HeavyTop(inertia, rng.choice((1, -2)), triple(rng)), State(triple(rng), triple(rng)))
 
 
+def random_spherical_pendulum(seed):
+    return random_tilted(seed, spherical=True)
+
+
 def random_tilted(seed, spherical=False):
     """A pendulum about an axis of the plane of the equal moments, or about any axis."""
     rng = random.Random(seed)

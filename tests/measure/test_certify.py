@@ -20,21 +20,9 @@ from heavytop.measure.reference import reference
 from heavytop.measure.scalar import GUARD_BITS
 from heavytop.measure.truth import certified
 from support.helpers import VECTORS, start_of, top_of
+from support.proofs import Changed
 
 KNOWN = [DeloneHomoclinic(Fraction(1), Fraction(1)), ErshkovPartial(Fraction(1), Fraction(6), Fraction(1))]
-
-
-class Changed:
-    """A motion of which ``change`` makes other balls, from the right ones and the time."""
-
-    def __init__(self, known, change, method="changed"):
-        self.known, self.change = known, change
-        self.method, self.source, self.system, self.top, self.start = method, "", known.system, known.top, known.start
-
-    def state(self, time, bits):
-        values = self.known.state(time, bits)
-        with working_precision(bits + 200):
-            return self.change(values, time)
 
 
 def shifted(known, error, after=5):

@@ -124,6 +124,24 @@ def assert_algebraic_solves(motion, time, bits=200):
         assert abs(sum(g[0] * g[0] for g in series[3:]) - 1) < arb("1e-55")
 
 
+class Changed:
+    """A motion of which ``change`` makes other balls or series, from the right ones and the time."""
+
+    def __init__(self, known, change, method="changed"):
+        self.known, self.change = known, change
+        self.method, self.source, self.system, self.top, self.start = method, "", known.system, known.top, known.start
+
+    def state(self, time, bits):
+        values = self.known.state(time, bits)
+        with working_precision(bits + 200):
+            return self.change(values, time)
+
+    def series(self, time, length, bits):
+        values = self.known.series(time, length, bits)
+        with working_precision(bits + 200):
+            return self.change(values, time)
+
+
 class AsRounded:
     """The motion as if it were that of a top whose data agree with it to 280 bits."""
 
