@@ -59,8 +59,10 @@ def test_the_enclosure_holds_the_attitude(seed):
 
 
 @pytest.mark.parametrize("spherical", [False, True])
-def test_the_catalogue_finds_tilted_pendulums(spherical):
+def test_the_catalogue_finds_tilted_pendulums_that_solve_all_six_equations(spherical):
     motion = random_tilted(1, spherical)
+    assert_solves(motion, F(7, 3))
+    assert_attitude(motion, F(7, 3))
     assert isinstance(find(motion.top, motion.start), Pendulum)
 
 
