@@ -254,22 +254,35 @@ HALVES = sympy.tanh(T) * sympy.sqrt(T**2) - T * sympy.sqrt(sympy.tanh(T) ** 2)
 """0 for either sign of t by algebra, and not for both at once."""
 
 
-def verdict(residual: sympy.Expr, domain: Domain = ALL, flow: Flow | None = None) -> bool | None:
-    (row,) = judge([statement(residual, flow, domain, Formulas())], setting())
-    return row.holds
+GAP, KINK = (T**2 + T) / T - T - 1, 3 + sympy.sign(sympy.sqrt(2) - sympy.sqrt(T))
 
 
-def test_halves_join_where_the_variable_is_time_and_nowhere_else() -> None:
-    assert verdict(HALVES) is True
-    noted = Domain("all", 0, ALL.points, "positive roots")
-    assert verdict(HALVES, noted) is None
-    assert verdict(HALVES, flow=Flow(lambda e: sympy.diff(e, T), frozenset((T,)))) is None
-    assert [verdict(HALVES, each) for each in (BEFORE, AFTER)] == [True, True]
-
-
-def test_the_end_of_the_domain_belongs_to_it_where_its_label_says_so() -> None:
-    gap = (T**2 + T) / T - T - 1
-    assert [verdict(gap, each) for each in (BEFORE, AFTER)] == [None, True]
+@pytest.mark.parametrize(
+    ("residual", "parts", "holds"),
+    [
+        # halves join where the variable is time and nowhere else
+        (HALVES, {}, True),
+        (HALVES, {"domain": Domain("all", 0, ALL.points, "positive roots")}, None),
+        (HALVES, {"flow": Flow(lambda e: sympy.diff(e, T), frozenset((T,)))}, None),
+        *((HALVES, {"domain": half}, True) for half in (BEFORE, AFTER)),
+        # a half alone proves nothing of the whole
+        *((sympy.sqrt(T**2) + sign * T, {}, False) for sign in (1, -1)),
+        # the end of the domain belongs to it where its label says so
+        (GAP, {"domain": BEFORE}, None),
+        (GAP, {"domain": AFTER}, True),
+        # a ball that is not a number, or not real, excludes 0 and is no witness
+        *((residual, {}, None) for residual in (1 + sympy.sqrt(-1 - T**2), 1 + sympy.log(-1 - T**2))),
+        (2 + sympy.acos(2 + T**2), {}, None),
+        # where a derivative may have a kink nothing is refuted
+        (KINK, {"domain": Domain("t>0", 1, (Fraction(2),))}, None),
+        (KINK, {"domain": Domain("t>0", 1, (Fraction(2), Fraction(3)))}, False),
+        # off by less than a short ball shows
+        (sympy.sqrt(2 + T**2) - sympy.sqrt(2 + T**2 + sympy.Rational(1, 10**100)), {}, False),
+    ],
+)
+def test_a_residual_is_judged_on_its_domain_alone(residual: sympy.Expr, parts: dict, holds: bool | None) -> None:
+    (row,) = judge([statement(residual, formulas=Formulas(), **parts)], setting())
+    assert row.holds is holds
 
 
 def test_a_note_makes_another_domain() -> None:
@@ -279,25 +292,6 @@ def test_a_note_makes_another_domain() -> None:
     for domains, expected in (((known, ALL), [True, None]), ((ALL, known), [None, True])):
         stated = [Statement("1", i, "smooth", domain, residual, "") for i, domain in enumerate(domains)]
         assert [row.holds for row in judge(stated, setting())] == expected
-
-
-@pytest.mark.parametrize(
-    "residual",
-    [
-        # a ball that is not a number, or not real, excludes 0 and is no witness
-        1 + sympy.sqrt(-1 - T**2),
-        1 + sympy.log(-1 - T**2),
-        2 + sympy.acos(2 + T**2),
-    ],
-)
-def test_what_is_not_real_refutes_nothing(residual: sympy.Expr) -> None:
-    assert verdict(residual) is None
-
-
-def test_where_a_derivative_may_have_a_kink_nothing_is_refuted() -> None:
-    kink = sympy.sign(sympy.sqrt(2) - sympy.sqrt(T))
-    assert verdict(3 + kink, Domain("t>0", 1, (Fraction(2),))) is None
-    assert verdict(3 + kink, Domain("t>0", 1, (Fraction(2), Fraction(3)))) is False
 
 
 def test_a_kink_is_no_place_where_a_residual_is_defined() -> None:
@@ -312,10 +306,6 @@ def test_what_fails_on_the_relations_is_not_removable() -> None:
     for relations, expected in (((), True), ((A - 1,), False)):
         region = region_of(A - 1, setting(1, relations=relations))
         assert region.is_removable(Need(ConditionKind.NONZERO, A - 1)) is expected
-
-
-def test_what_is_off_by_less_than_a_short_ball_shows_is_refuted_all_the_same() -> None:
-    assert verdict(sympy.sqrt(2 + T**2) - sympy.sqrt(2 + T**2 + sympy.Rational(1, 10**100))) is False
 
 
 @pytest.mark.parametrize(
@@ -374,11 +364,6 @@ def test_what_the_flow_does_not_keep_may_become_0(rate: sympy.Expr, kept: bool) 
     flow = Flow(lambda e: sympy.diff(e, A) * rate, frozenset({A}))
     where = region_of(A, setting(-2), flow)
     assert where.is_nowhere_zero(where.field.enter(A).numerator) is kept
-
-
-def test_a_half_alone_proves_nothing_of_the_whole() -> None:
-    for residual in (sympy.sqrt(T**2) - T, sympy.sqrt(T**2) + T):
-        assert verdict(residual) is False
 
 
 def test_both_halves_are_asked_what_they_divide_by() -> None:

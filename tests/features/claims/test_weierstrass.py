@@ -27,33 +27,29 @@ def test_the_branch_without_poles_satisfies_its_equation_where_the_roots_are_thr
     assert rotation(_zero("wp3", "a", "b"), ["a^3 > 27*b^2"], parameters=samples).verdict == "holds"
 
 
-@pytest.mark.parametrize(("g2", "g3"), [("3", "1"), ("0", "0"), ("1", "3")])
-def test_colliding_and_complex_roots_leave_no_bounded_branch(g2: str, g3: str) -> None:
-    report = rotation(_zero("wp3", g2, g3))
-    assert report.verdict == "undecided"
-    assert "> 0" in open_conditions(report)
+POLES = (_zero("wp", "4", "1"), "1 + 0*wp(t, 4, 1)", "1 + wp(t, 4, 1) - wp(t, 4, 1)", "wp(t, 1, 0)/wp(t, 1, 0)")
 
 
 @pytest.mark.parametrize(
-    "rate", [_zero("wp", "4", "1"), "1 + 0*wp(t, 4, 1)", "1 + wp(t, 4, 1) - wp(t, 4, 1)", "wp(t, 1, 0)/wp(t, 1, 0)"]
+    ("rate", "domain", "verdict", "named"),
+    [
+        # colliding and complex roots leave no bounded branch
+        *((_zero("wp3", *roots), "all", "undecided", "> 0") for roots in (("3", "1"), ("0", "0"), ("1", "3"))),
+        # poles on the real line are never passed over; of numbers they are excluded by balls
+        *((rate, domain, "undecided", "t is not a period of wp(u, ") for rate in POLES for domain in ("all", "t>0")),
+        ("1 + wp(1, 4, 1) - wp(1, 4, 1)", "all", "holds", ""),
+        ("1 + 0*wp(0, 4, 1)", "all", "undecided", ""),
+        ("1 + wp3(t, 4, 1) - wp3(t, 4, 999/1000)", "all", "refuted", ""),
+        ("wp3(t, 4, 1)", "all", "refuted", ""),
+        ("1 + wp(t, 4, 1) - wp(2*t, 4, 1)", "all", "refuted", ""),
+    ],
 )
-@pytest.mark.parametrize("domain", ["all", "t>0"])
-def test_poles_on_the_real_line_are_never_passed_over(rate: str, domain: str) -> None:
+def test_a_rate_is_constant_where_it_is_defined_and_its_neighbours_are_not(
+    rate: str, domain: str, verdict: str, named: str
+) -> None:
     report = rotation(rate, domain=domain)
-    assert report.verdict == "undecided"
-    assert "t is not a period of wp(u, " in open_conditions(report)
-
-
-def test_of_numbers_poles_are_excluded_by_balls() -> None:
-    assert rotation("1 + wp(1, 4, 1) - wp(1, 4, 1)").verdict == "holds"
-    assert rotation("1 + 0*wp(0, 4, 1)").verdict == "undecided"
-
-
-@pytest.mark.parametrize(
-    "rate", ["1 + wp3(t, 4, 1) - wp3(t, 4, 999/1000)", "wp3(t, 4, 1)", "1 + wp(t, 4, 1) - wp(2*t, 4, 1)"]
-)
-def test_what_is_false_is_refuted(rate: str) -> None:
-    assert rotation(rate).verdict == "refuted"
+    assert report.verdict == verdict
+    assert named in open_conditions(report)
 
 
 def test_invariants_that_move_are_not_proven() -> None:
