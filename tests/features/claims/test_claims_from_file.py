@@ -46,44 +46,35 @@ def refuted(report: Audit) -> set[tuple[str, int]]:
     return {(row.equation, row.component) for row in report.rows if row.holds is False}
 
 
-@pytest.mark.slow
-def test_the_delone_motion_holds_in_every_equation():
-    report = audited(table("delone-homoclinic"))
-    assert report.verdict == "holds"
-    assert report.solves == ("heavy_top",)
-    assert {row.equation for row in report.rows} == {"1.1", "1.2", "1.3"}
+MOMENT = "p*(I3*(s + p*cos(theta)) - I1*p*cos(theta))"
+EXAMPLE_AND_NEIGHBOURS = [
+    ("delone-homoclinic", (), "", {}),
+    ("delone-homoclinic", ("motion", "omega", 0), "-alpha*sin_phi/2", {("1.1", 1)}),
+    ("delone-homoclinic", ("motion", "omega", 2), "(2 + 1e-30)*alpha*cos_theta", {("1.1", 3)}),
+    ("delone-homoclinic", ("motion", "gamma", 2), "-cos_theta", {("1.2", 2)}),
+    ("lagrange-wrong-sign", (), "", {("1.1", 1), ("1.1", 2)}),
+    ("lagrange-wrong-sign", ("definitions", "moment"), MOMENT, {}),
+    ("kovalevskaya-integral", (), "", {}),
+    ("kovalevskaya-integral", ("top", "inertia"), ["2*I3", "2*I3", "3*I3/2"], {("dF/dt", 1)}),
+]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("part", "index", "wrong", "expected"),
-    [
-        ("omega", 0, "-alpha*sin_phi/2", ("1.1", 1)),
-        ("omega", 2, "(2 + 1e-30)*alpha*cos_theta", ("1.1", 3)),
-        ("gamma", 2, "-cos_theta", ("1.2", 3)),
-    ],
-)
-def test_a_mistake_in_the_delone_motion_is_refuted(part, index, wrong, expected):
-    content = table("delone-homoclinic")
-    content["motion"][part][index] = wrong
+@pytest.mark.parametrize(("name", "place", "value", "wrong"), EXAMPLE_AND_NEIGHBOURS)
+def test_an_example_has_its_verdict_and_a_mistake_in_it_is_refuted_where_it_is(name, place, value, wrong):
+    content = part = table(name)
+    for key in place[:-1]:
+        part = part[key]
+    if place:
+        part[place[-1]] = value
     report = audited(content)
-    assert report.verdict == "refuted"
-    assert expected in refuted(report) or {name for name, _ in refuted(report)} & {expected[0]}
-
-
-def test_the_lagrange_example_is_refuted_in_1_1_and_holds_with_the_sign_put_right():
-    content = table("lagrange-wrong-sign")
-    assert refuted(audited(content)) == {("1.1", 1), ("1.1", 2)}
-    content["definitions"]["moment"] = "p*(I3*(s + p*cos(theta)) - I1*p*cos(theta))"
-    assert audited(content).verdict == "holds"
-
-
-@pytest.mark.slow
-def test_kovalevskayas_integral_holds_and_fails_with_other_moments():
-    content = table("kovalevskaya-integral")
-    assert audited(content).verdict == "holds"
-    content["top"]["inertia"] = ["2*I3", "2*I3", "3*I3/2"]
-    assert audited(content).verdict == "refuted"
+    assert report.verdict == ("refuted" if wrong else "holds")
+    assert refuted(report) >= set(wrong)
+    if (name, place) == ("delone-homoclinic", ()):
+        assert report.solves == ("heavy_top",)
+        assert {row.equation for row in report.rows} == {"1.1", "1.2", "1.3"}
+    if (name, place) == ("lagrange-wrong-sign", ()):
+        assert refuted(report) == wrong
 
 
 @pytest.mark.slow
@@ -127,13 +118,6 @@ def test_a_hostile_file_is_exit_2(tmp_path, text):
 def test_an_audit_that_does_not_end_is_stopped():
     with pytest.raises(InputError, match="was stopped"):
         in_time(str(EXAMPLES / "delone-homoclinic.toml"), "heavy_top", seconds=0.01)
-
-
-def test_a_sample_that_breaks_an_assumption_is_refused():
-    content = table("delone-homoclinic")
-    content["parameters"]["alpha"] = ["-1", "1"]
-    with pytest.raises(InputError, match="breaks the assumption"):
-        audited(content)
 
 
 @pytest.mark.slow
