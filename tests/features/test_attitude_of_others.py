@@ -5,7 +5,6 @@ from math import isclose
 from pathlib import Path
 
 import pytest
-from rich.console import Console
 
 import heavytop as ht
 from heavytop.features.kinds import KINDS
@@ -16,6 +15,7 @@ from heavytop.precision import exact
 from heavytop.records import NOT_CARRIED, Row
 from heavytop.report.compare.noise import Policy
 from heavytop.report.compare.verdicts import Verdict
+from support.helpers import shown
 from support.reports import compare, read_plan, summary
 from support.small_reports import report
 
@@ -71,13 +71,6 @@ def measured(folder: Path, function: str = "solve", rate: float = 0.0, numbers: 
     return [suite_rows.measure(KINDS[task.key.kind], task, Saved()) for task in tasks]
 
 
-def shown(rows: list[Row]) -> str:
-    console = Console(width=120)
-    with console.capture() as captured:
-        console.print(summary(report(*rows)))
-    return captured.get()
-
-
 @pytest.fixture(scope="module")
 def healthy(tmp_path_factory: pytest.TempPathFactory) -> list[Row]:
     return measured(tmp_path_factory.mktemp("healthy"))
@@ -112,8 +105,8 @@ def test_of_others_omega_and_gamma_are_measured_and_the_row_says_so(healthy: lis
         assert "attitude" not in other.flags
         assert "solution_error_omega_max" in row.metrics
         assert not [name for name in row.metrics if "attitude" in name or "position" in name]
-    assert "not carried" in shown(alone[:-1])
-    assert "not carried" not in shown(healthy)
+    assert "not carried" in shown(summary(report(*alone[:-1])), 120)
+    assert "not carried" not in shown(summary(report(*healthy)), 120)
 
 
 def test_who_declares_it_and_gives_six_numbers_has_failed_rows(tmp_path: Path) -> None:

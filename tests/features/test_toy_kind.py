@@ -4,7 +4,6 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import pytest
-from rich.console import Console
 
 from heavytop.features.kinds import KINDS
 from heavytop.harness.checkpoint import Checkpoint, Saved
@@ -20,6 +19,7 @@ from heavytop.report.document.document import Block, Chart, Headline, Section, S
 from heavytop.report.document.document import Table as Cells
 from heavytop.report.render.page import report_page
 from heavytop.report.render.terminal import summary
+from support.helpers import shown
 from support.small_reports import report
 
 WEIGHT = Quantity("toy_weight")
@@ -117,13 +117,9 @@ def test_spawned_workers_know_it_too(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_its_rows_have_their_lines_and_their_section(tmp_path: Path) -> None:
-    console = Console(width=100)
     made = report(*measured(tmp_path))
-    with console.capture() as capture:
-        console.print(summary(made, KINDS_WITH_TOY))
-    assert "4 toys are weighed." in capture.get()
-    assert "Toys" in capture.get()
-    assert "4.5" in capture.get()
+    text = shown(summary(made, KINDS_WITH_TOY), 100)
+    assert all(part in text for part in ("4 toys are weighed.", "Toys", "4.5")), text
     page = report_page(made, KINDS_WITH_TOY)
     assert '<section id="toys"' in page
     assert "Their weights." in page

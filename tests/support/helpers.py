@@ -14,6 +14,7 @@ from time import monotonic, sleep
 from typing import Any
 
 from flint import fmpq
+from rich.console import Console, RenderableType
 
 from heavytop.harness import integrator_check
 from heavytop.integrate import registry
@@ -123,6 +124,14 @@ def distance(one: Trajectory, other: Trajectory) -> Fraction:
 def judged(which: IntegratorSource, part: str) -> integrator_check.Checked:
     """One part of the contract alone."""
     return integrator_check._judged(part, dict(integrator_check._Contract(which).parts())[part])
+
+
+def shown(document: RenderableType, width: int = 80) -> str:
+    """The text of a document of the terminal."""
+    console = Console(width=width, force_terminal=False)
+    with console.capture() as captured:
+        console.print(document)
+    return captured.get()
 
 
 def without_progress(errors: str) -> str:

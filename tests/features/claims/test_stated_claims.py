@@ -5,13 +5,13 @@ import random
 from typing import Any
 
 import pytest
-from rich.console import Console
 
 import stated_claims
 from heavytop.errors import InputError
 from heavytop.features.claims.audit.judge import Audit
 from heavytop.features.claims.text import audit_text
 from support.claim_tables import audited, rotation
+from support.helpers import shown
 
 
 def spinning(rate: str, assume: list[str], **parts: Any) -> Audit:
@@ -42,17 +42,10 @@ def test_a_parameter_that_no_formula_uses_is_said_and_columns_are_those_that_tel
     report = spinning("2*c", ["b > 0"], definitions={"c": "a", "d": "b"})
     assert report.unused == ("b",)
     assert report.to_json()["unused"] == ["b"]
-    text = shown(report)
+    text = shown(audit_text(report))
     assert "No formula uses b" in text
     assert "equation  verdict  residual" in text
-    assert "equation  domain  verdict" in shown(spinning("2*a", [], domain="t>0"))
-
-
-def shown(report: Audit) -> str:
-    console = Console(width=80, force_terminal=False)
-    with console.capture() as capture:
-        console.print(audit_text(report))
-    return capture.get()
+    assert "equation  domain  verdict" in shown(audit_text(spinning("2*a", [], domain="t>0")))
 
 
 ATTITUDE = stated_claims.free_quaternion()

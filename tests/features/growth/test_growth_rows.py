@@ -2,13 +2,11 @@
 
 from dataclasses import replace
 from fractions import Fraction
-from io import StringIO
 from pathlib import Path
 
 import msgspec
 import numpy
 import pytest
-from rich.console import Console
 
 from heavytop.cases import CASES
 from heavytop.errors import InputError
@@ -25,6 +23,7 @@ from heavytop.measure.truth import reference
 from heavytop.precision import DOUBLE, cross
 from heavytop.report.compare.noise import Policy
 from heavytop.top.equations import GYROSTAT, holding
+from support.helpers import shown
 from support.reports import compare, expand, load, measure, summary, tasks_of
 from support.small_reports import report
 
@@ -198,10 +197,8 @@ def test_failed_starts_are_counted_and_never_averaged(tmp_path: Path, monkeypatc
 
 @pytest.mark.slow
 def test_the_laws_are_said_in_words(tmp_path: Path) -> None:
-    console = Console(width=160, record=True, file=StringIO())
     (task,) = tasks(tmp_path, '"kovalevskaya"', 'precision = "double", horizon = "5e2", starts = 9, decades = 3')
-    console.print(summary(report(measure(task.of(replace(task.case, name="mine"))))))
-    text = console.export_text()
+    text = shown(summary(report(measure(task.of(replace(task.case, name="mine"))))), 160)
     assert "Growth laws" in text
     (line,) = [line for line in text.splitlines() if "energy" in line]
     assert line.split()[:5] == ["mine", "double", "energy", "9", "t^0.5"]

@@ -5,12 +5,10 @@ import re
 import shlex
 import tomllib
 from fractions import Fraction
-from io import StringIO
 from pathlib import Path
 
 import msgspec
 import pytest
-from rich.console import Console
 from typer.testing import CliRunner
 
 import heavytop as ht
@@ -30,6 +28,7 @@ from heavytop.precision import DOUBLE
 from heavytop.records import Quantity, Series
 from heavytop.report.render.page import report_page
 from support import small_reports
+from support.helpers import shown
 from support.small_reports import error
 
 pytestmark = pytest.mark.pictures
@@ -56,9 +55,7 @@ def given(case=CASE, times=TIMES, spoilt=lambda i, state: state, precision=DOUBL
 
 
 def printed(found, width: int = 80) -> list[str]:
-    console = Console(width=width, file=StringIO(), record=True)
-    console.print(score_text(found))
-    return [line.rstrip() for line in console.export_text().splitlines()]
+    return [line.rstrip() for line in shown(score_text(found), width).splitlines()]
 
 
 @pytest.fixture(scope="module")

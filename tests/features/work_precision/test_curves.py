@@ -6,7 +6,6 @@ from typing import Any
 
 import msgspec
 import pytest
-from rich.console import Console
 
 from heavytop.errors import InputError
 from heavytop.features.kinds import KINDS
@@ -24,6 +23,7 @@ from heavytop.report.document.document import Headline
 from heavytop.report.document.svg import quiet_style
 from heavytop.report.render.plots import draw_report
 from support import small_reports
+from support.helpers import shown
 from support.reports import Row, summary
 from support.small_reports import report
 
@@ -193,10 +193,7 @@ def test_cases_formats_and_failures_are_kept_apart() -> None:
 
 
 def test_the_summary_says_it() -> None:
-    console = Console(width=160)
-    with console.capture() as capture:
-        console.print(summary(report(*ALL)))
-    text = capture.get()
+    text = shown(summary(report(*ALL)), 160)
     assert "4.5 × as fast as the best other integrator, cyrk:DOP853" in text
     assert "Failed measurements" not in text
     (line,) = [line for line in text.splitlines() if "sundials:CVODE" in line]
