@@ -20,7 +20,7 @@ from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.motions import states_at
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import DOUBLE, decimal_text, dot, log10, plain_decimal
-from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System
+from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, SYSTEMS, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 WITH_ATTITUDE = (HEAVY_TOP, HEAVY_GYROSTAT)
@@ -352,8 +352,9 @@ def motion_in_double(system: System, numbers: Array, first: Array, times: Array)
         if not targets:
             continue
         attitude = len(first) > 6
-        # 0.1 s to compile in place of 0.8, for some hundred motions that take twice as long
-        with compiled(system, DOUBLE, attitude=attitude, compact_mode=attitude).borrowed() as engine:
+        # a third of the seconds to compile, for some hundred motions that take twice as long
+        compact = attitude or system not in SYSTEMS
+        with compiled(system, DOUBLE, attitude=attitude, compact_mode=compact).borrowed() as engine:
             states, outcome, *_ = states_at(engine, numbers, first, targets, _STEPS, DOUBLE)
         if outcome is not Outcome.SUCCESS:
             return None

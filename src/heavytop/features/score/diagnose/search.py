@@ -166,5 +166,6 @@ def scope(times: Sequence[Fraction], states: int) -> tuple[int, int, str] | None
 
 
 def _of_kind(kind: str, tried: Sequence[tuple[Hypothesis, float]]) -> tuple[Hypothesis, float]:
-    """The hypothesis of a kind whose number fits best, and the error that it leaves."""
-    return min((pair for pair in tried if pair[0].kind == kind), key=lambda pair: max(pair[1], FLOOR))
+    """The hypothesis of a kind whose number fits best, the first of equal ones, and the error that it leaves."""
+    # rounding, which no two machines share, does not decide
+    return min((pair for pair in tried if pair[0].kind == kind), key=lambda pair: float(f"{max(pair[1], FLOOR):.5e}"))
