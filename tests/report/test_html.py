@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from heavytop.errors import InputError
 from heavytop.features.kinds import KINDS
 from heavytop.integrate.registry import is_third_party
 from heavytop.measure.scalar import RELATIVE
@@ -291,6 +292,13 @@ def test_how_to_reproduce_names_the_plan_only_where_it_is_built_in() -> None:
     assert html.commands(report)[0] == f"git checkout {'0' * 40}"
     unknown = replace(report, environment={"packages": {"heavytop": "0.1.0"}, "commit": None})
     assert html.commands(unknown)[0] == "# heavytop 0.1.0"
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_page_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be written"):
+        html.write_report(full_report(), tmp_path / "none" / "page.html")
+    assert not list(tmp_path.iterdir())
 
 
 def test_every_number_of_the_results_is_in_the_page(pages: dict[str, Page]) -> None:
