@@ -34,10 +34,7 @@ NOT_CODE = {
     "{figure}",
     "{note}",
     "{include} ../CHANGELOG.md",
-    "{include} _build/claims.md",
-    "{include} _build/commands.md",
-    "{include} _build/engines.md",
-    "{include} _build/public.md",
+    *(f"{{include}} _build/{name}.md" for name in ("claims", "commands", "engines", "public")),
     "{thumbnails}",
 }
 CELL = "{code-cell} ipython3"

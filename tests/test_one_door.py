@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 import pytest
-from typer.testing import CliRunner
+from typer.testing import CliRunner, Result
 
 import heavytop as ht
 from heavytop.api.integrators import case_document, check_integrator, listing, new_integrator
@@ -110,10 +110,14 @@ def of_python(call: Callable[..., Any], given: dict[str, str], **more: Any) -> A
     return call(top, start, **options, **more)
 
 
+def invoked(*words: str) -> Result:
+    """The command of these words, whose errors are raised."""
+    return CliRunner().invoke(app, list(words), catch_exceptions=False, standalone_mode=False)
+
+
 def of_command(command: str, given: dict[str, str]) -> Any:
     words = [part for key, value in given.items() for part in (f"--{key}", *([value] if key != "attitude" else []))]
-    done = CliRunner().invoke(app, [command, *words, "--json"], catch_exceptions=False, standalone_mode=False)
-    return json.loads(done.stdout)
+    return json.loads(invoked(command, *words, "--json").stdout)
 
 
 def outcome(call: Callable[[], Any]) -> Any:
@@ -265,7 +269,7 @@ def test_bad_input_of_every_other_command_is_the_same_error(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     words, call = COMMANDS[name]
-    said = outcome(lambda: CliRunner().invoke(app, words.split(), catch_exceptions=False, standalone_mode=False))
+    said = outcome(lambda: invoked(*words.split()))
     assert isinstance(said, tuple)
     assert said == outcome(call)
     assert list(tmp_path.iterdir()) == []
@@ -319,11 +323,10 @@ def trajectory(tmp_path_factory: pytest.TempPathFactory) -> Path:
     states = run.texts()
     states[-1] = [f"{float(value):.8g}" for value in states[-1]]
     file = tmp_path_factory.mktemp("scored") / "mine.json"
-    data = {"inertia": known.top.inertia, "weight": known.top.weight, "centre": known.top.centre}
-    start = {"omega": known.start.omega, "gamma": known.start.gamma}
-    texts = {key: list(map(str, value)) if isinstance(value, tuple) else str(value) for key, value in data.items()}
-    texts |= {key: list(map(str, value)) for key, value in start.items()}
-    document = {"precision": "double", **texts, "times": ["1", "2"], "states": states}
+    vectors = {name: getattr(known.top, name) for name in ("inertia", "centre")}
+    vectors |= {name: getattr(known.start, name) for name in ("omega", "gamma")}
+    data = {"weight": str(known.top.weight)} | {name: list(map(str, value)) for name, value in vectors.items()}
+    document = {"precision": "double", **data, "times": ["1", "2"], "states": states}
     file.write_text(json.dumps(document), "utf-8")
     return file
 
@@ -335,9 +338,7 @@ def test_a_score_is_the_same_or_the_same_error(name: str, trajectory: Path, requ
         request.getfixturevalue("undiagnosed")
 
     def printed() -> Any:
-        done = CliRunner().invoke(
-            app, ["score", str(trajectory), *words, "--json"], catch_exceptions=False, standalone_mode=False
-        )
+        done = invoked("score", str(trajectory), *words, "--json")
         return json.loads(done.stdout), done.return_value
 
     def computed() -> Any:

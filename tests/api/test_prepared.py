@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
+from itertools import product
 from typing import Any
 
 import numpy
@@ -105,34 +106,16 @@ def test_what_is_not_reached_is_no_number_and_said() -> None:
     assert "not all times were reached" in str(found)
 
 
-@pytest.mark.parametrize(
-    ("start", "times"),
-    [
-        ([1, 2, 3, 1, 1, 1], 1),
-        ([1.0, 2.0, 3.0, 1.0, 1.0, 1.0], 1),
-        (ROW[:5], 1),
-        ([ROW, ROW[:5]], 1),
-        (numpy.zeros((0, 6)), 1),
-        (numpy.zeros((2, 2, 6)), 1),
-        ([float("nan"), *ROW[1:]], 1),
-        ([*ROW[:5], float("nan")], 1),
-        ([float("inf"), *ROW[1:]], 1),
-        ([1e151, *ROW[1:]], 1),
-        ("110000", 1),
-        (None, 1),
-        (7, 1),
-        (ROW, float("nan")),
-        (ROW, float("inf")),
-        (ROW, []),
-        (ROW, [2, 1]),
-        (ROW, [-1, 1]),
-        (ROW, None),
-        (ROW, True),
-        (ROW, "soon"),
-        (ROW, 1e151),
-    ],
-    ids=repr,
+NAN, INFINITE = float("nan"), float("inf")
+BAD_STARTS = (
+    *([1, 2, 3, 1, 1, 1], [1.0, 2.0, 3.0, 1.0, 1.0, 1.0], ROW[:5], [ROW, ROW[:5]], numpy.zeros((0, 6))),
+    *(numpy.zeros((2, 2, 6)), [NAN, *ROW[1:]], [*ROW[:5], NAN], [INFINITE, *ROW[1:]], [1e151, *ROW[1:]]),
+    *("110000", None, 7),
 )
+BAD_TIMES = (NAN, INFINITE, [], [2, 1], [-1, 1], None, True, "soon", 1e151)
+
+
+@pytest.mark.parametrize(("start", "times"), [*product(BAD_STARTS, [1]), *product([ROW], BAD_TIMES)], ids=repr)
 def test_bad_starts_and_times_are_refused(start: Any, times: Any) -> None:
     with pytest.raises(ht.InputError):
         ht.Integrator(TOP).propagate(start, times)
