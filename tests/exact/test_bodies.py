@@ -219,6 +219,7 @@ def test_principal_axes_change_no_bit_and_permutations_round_nothing() -> None:
         (lambda: ht.Body(1, 1, (0, 0, 1), (1, 1, 1), "the end"), "'the end'"),
         (lambda: ht.Body(1, 1, (0, 0, 0), (1, 1)), "2 numbers"),
         (lambda: ht.Body(1, 1, (0, 0, 0), [[1, 2, 0], [0, 1, 0], [0, 0, 1]]), "not symmetric: I12 = 2, I21 = 0"),
+        (lambda: ht.Body(1, 1, (0, 0, 0), [[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]), "not symmetric: I12 = 0.1, I21 = 0"),
         (lambda: ht.Body(1, 1, (0, 0, 0), (1, 1, 1, 2, 0, 0)), "principal moments of inertia must be positive"),
         (lambda: ht.Body(1, 1, (0, 0, 0), (1, -1, 1)), "principal moments of inertia must be positive"),
         (lambda: ht.Body("nan", 1, (0, 0, 0), (1, 1, 1)), "nan"),

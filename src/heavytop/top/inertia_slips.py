@@ -14,7 +14,7 @@ from fractions import Fraction
 from itertools import chain, combinations, permutations, product
 
 from heavytop.errors import InputError
-from heavytop.precision import Vector, cross, decimal_text, dot, round_to, shown
+from heavytop.precision import Vector, cross, decimal_text, distinct_digits, dot, round_to
 from heavytop.top.attitude import Rows, multiplied, transposed
 
 Tensor = tuple[Vector, Vector, Vector]
@@ -104,9 +104,9 @@ def six_of_nine(n: Sequence[Fraction]) -> Six:
     for i, j in ((0, 1), (0, 2), (1, 2)):
         upper, lower = n[3 * i + j], n[3 * j + i]
         if abs(upper - lower) > _ROUNDINGS * max(map(abs, n)):
+            one, other = distinct_digits(upper, lower)
             raise InputError(
-                f"The inertia tensor is not symmetric: I{i + 1}{j + 1} = {shown(upper)}, "
-                f"I{j + 1}{i + 1} = {shown(lower)}.",
+                f"The inertia tensor is not symmetric: I{i + 1}{j + 1} = {one}, I{j + 1}{i + 1} = {other}.",
                 "Give the same number in both places.",
             )
     return n[0], n[4], n[8], n[1], n[2], n[5]

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import heavytop as ht
 from heavytop.cases import CASES
 from heavytop.errors import InputError
 from heavytop.features.score import measurement
@@ -292,3 +293,14 @@ def test_what_has_no_end_is_refused_before_it_is_read(tmp_path: Path) -> None:
             read(file)
     with pytest.raises(InputError, match=r"has none of the endings"):
         read(Path("/dev/zero"))
+
+
+def test_states_of_an_iterator_are_read_once() -> None:
+    given, case = document(), LAGRANGE
+    scores = [
+        str(ht.score(TIMES, states, top=case.top, start=case.start, precision=DOUBLE))
+        for states in (given["states"], iter(given["states"]), (iter(state) for state in given["states"]))
+    ]
+    assert scores == scores[:1] * 3
+    with pytest.raises(InputError, match="normalize = 'yes' is not a bool"):
+        ht.score(TIMES, given["states"], top=case.top, start=case.start, normalize="yes")

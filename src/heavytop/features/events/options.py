@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from heavytop.errors import InputError
+
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
@@ -35,6 +37,8 @@ class EventOptions(NamedTuple):
         from heavytop.features.events.functions import event_function
 
         require_direction(self.event_direction)
+        if self.event_direction and not self.events:
+            raise InputError("--event-direction was given without --events.", "Give --events FUNCTION too.")
         for text in self.events or ():
             event_function(text)
         return "events" if self.events else ""

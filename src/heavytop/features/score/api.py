@@ -241,6 +241,8 @@ def score(
     body = top if isinstance(top, Body) else arguments.is_a(top, HeavyTop, "top")
     about, instants = arguments.system(system, body), list(check_times(times))
     names = arguments.text(name, "name"), arguments.text(integrator, "integrator")
+    given = None if states is None else _rows(states, "states")  # read once: it may be an iterator
+    flag = bool(arguments.flag(normalize, "normalize"))
     arrays = columns(
         {
             "omega": omega,
@@ -251,12 +253,12 @@ def score(
             "euler": euler,
             "position": positions,
         },
-        None if states is None else _rows(states, "states"),
+        given,
     )
     state = arguments.is_a(start, State, "start")
-    if states is not None and set(arrays) == {"omega", "gamma"} and isinstance(body, HeavyTop) and not state.attitude:
+    if given is not None and set(arrays) == {"omega", "gamma"} and isinstance(body, HeavyTop) and not state.attitude:
         _, state = arguments.motion(body, state)
-        return scored(of_arrays(body, state, about, instants, _rows(states, "states"), form, *names), needed)
+        return scored(of_arrays(body, state, about, instants, given, form, *names), needed)
     words = {"quaternion_order": quaternion_order, "quaternion": quaternion, "matrix": matrix, "angles": angles}
     words |= {"sequence": sequence, "up": up}
     words = {word: arguments.text(value, word) for word, value in words.items()} | {"sequence": sequence.upper()}
@@ -265,7 +267,6 @@ def score(
     if "euler" in arrays and not said.sequence:
         raise InputError("Euler angles need their sequence.", 'Give sequence, such as "ZXZ" or "ZYX".')
     require_system(about)
-    flag = bool(arguments.flag(normalize, "normalize"))
     trajectory = of_observed_arrays(body, raw_start(state), said, instants, arrays, form, names, flag)
     return scored(trajectory, needed)
 
