@@ -3,6 +3,7 @@
 import json
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
+from functools import partial
 
 import numpy as np
 import pytest
@@ -41,17 +42,6 @@ def test_the_lyapunov_exponent_is_that_of_the_matrix(known):
         assert abs(float(exponent.value) - np.log(np.linalg.svd(matrix)[1][0]) / time) < 1e-14
         assert float(exponent.radius) < 1e-23
     assert ht.reference(TOP, START, [0], 25, derivatives="start").lyapunov() == [None]
-
-
-def test_a_reference_without_derivatives_says_how_to_get_them():
-    with pytest.raises(InputError, match="has no derivatives"):
-        ht.reference(TOP, START, TIMES, 25).derivatives_numpy()
-
-
-@pytest.mark.parametrize("which", ["", "Start", "both", 1, True, ["start"]])
-def test_what_is_none_of_the_three_is_refused(which):
-    with pytest.raises(InputError, match="derivatives must be"):
-        ht.reference(TOP, START, TIMES, 25, derivatives=which)
 
 
 def test_digits_of_a_jacobian_are_counted_where_it_is_wrong(known):
@@ -101,32 +91,45 @@ def test_an_entry_that_is_not_finite_is_an_outcome(known):
     assert (score.outcome, score.passed, score.digits_right) == ("non_finite", None, None)
 
 
+IRRATIONAL = [["3", "1/7", 0], ["1/7", "2", 0], [0, 0, "3/2"]]
+SYMMETRIC = ht.HeavyTop((2, 2, 1), 1, (0, 0, 1))
+
+
+def reference(top=TOP, times=TIMES, **options):
+    return partial(ht.reference, top, START, times, 20, **options)
+
+
+def scored(jacobians, **options):
+    return partial(ht.score_derivatives, TIMES, jacobians, top=TOP, start=START, **options)
+
+
 @pytest.mark.parametrize(
-    ("jacobians", "why"),
+    ("call", "error", "why"),
     [
-        (np.zeros((2, 6)), "shape"),
-        (np.zeros((2, 5, 6)), "shape"),
-        (np.zeros((3, 6, 6)), "3 Jacobians"),
-        ([np.zeros((6, 6)), np.zeros((6, 5))], r"jacobians\[1\]"),
-        ([[["x"] * 6] * 6] * 2, "x"),
-        (None, "jacobians"),
-        ([], "0 Jacobians"),
+        (lambda: reference()().derivatives_numpy(), InputError, "has no derivatives"),
+        *(
+            (reference(derivatives=which), InputError, "derivatives must be")
+            for which in ("", "Start", "both", 1, True, ["start"])
+        ),
+        (reference(SYMMETRIC, ["1e9"], derivatives="start"), OutOfReach, "Derivatives at t = 1"),
+        (
+            reference(ht.Body(1, 1, ("1/2", 0, 0), IRRATIONAL, "pivot"), [1], derivatives="start"),
+            InputError,
+            "Derivatives need exact data",
+        ),
+        (scored(np.zeros((2, 6, 6)), derivatives="all"), InputError, "cannot be scored"),
+        (scored(np.zeros((2, 6))), InputError, "shape"),
+        (scored(np.zeros((2, 5, 6))), InputError, "shape"),
+        (scored(np.zeros((3, 6, 6))), InputError, "3 Jacobians"),
+        (scored([np.zeros((6, 6)), np.zeros((6, 5))]), InputError, r"jacobians\[1\]"),
+        (scored([[["x"] * 6] * 6] * 2), InputError, "x"),
+        (scored(None), InputError, "jacobians"),
+        (scored([]), InputError, "0 Jacobians"),
     ],
 )
-def test_arrays_of_another_shape_are_refused(jacobians, why):
-    with pytest.raises(InputError, match=why):
-        ht.score_derivatives(TIMES, jacobians, top=TOP, start=START)
-
-
-def test_one_matrix_is_scored_at_a_time():
-    body = ht.HeavyTop((3, 2, 1), 1, (0, 0, 1))
-    with pytest.raises(InputError, match="cannot be scored"):
-        ht.score_derivatives(TIMES, np.zeros((2, 6, 6)), top=body, start=START, derivatives="all")
-
-
-def test_what_nobody_waits_for_is_out_of_reach():
-    with pytest.raises(OutOfReach, match="Derivatives at t = 1"):
-        ht.reference(ht.HeavyTop((2, 2, 1), 1, (0, 0, 1)), START, ["1e9"], 20, derivatives="start")
+def test_what_has_no_derivatives_or_is_none_is_refused(call, error, why):
+    with pytest.raises(error, match=why):
+        call()
 
 
 @pytest.mark.slow
@@ -183,13 +186,6 @@ def test_derivatives_of_a_body_are_in_the_axes_given(place):
     ):
         for value, row in zip(values, matrix[0], strict=True):
             assert abs(value - Fraction(row[column].value)) < Fraction(1, 10**22)
-
-
-def test_irrational_axes_are_refused_with_the_remedy():
-    tensor = [["3", "1/7", 0], ["1/7", "2", 0], [0, 0, "3/2"]]
-    body = ht.Body(mass=1, gravity=1, centre=("1/2", 0, 0), inertia=tensor, about="pivot")
-    with pytest.raises(InputError, match="Derivatives need exact data"):
-        ht.reference(body, START, [1], 20, derivatives="start")
 
 
 @pytest.mark.slow
