@@ -37,7 +37,6 @@ class Engine:
         self.body, self.q, self.w = body, body.quaternion, body.omega
 
     def slope(self, q, w):
-        turned = lambda v: np.array([q[1] * v[2] - q[2] * v[1], q[2] * v[0] - q[0] * v[2], q[0] * v[1] - q[1] * v[0]])
         b, up = self.body, 2 * np.array([q[1] * q[3] - q[0] * q[2], q[2] * q[3] + q[0] * q[1], q[0]**2 / 2 + q[3]**2 / 2
             - q[1]**2 / 2 - q[2]**2 / 2])
         torque = np.cross(b.about_pivot @ w, w) + b.mass * b.gravity * np.cross(up, b.centre)
