@@ -13,6 +13,8 @@ from heavytop.features.claims.library.ershkov import PartialCase
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, number, real
 from support.helpers import positive
 
+TWO, SIX = (PartialCase(Fraction(1), Fraction(ratio), Fraction(1)) for ratio in (2, 6))
+
 
 def random_case(random: Random) -> PartialCase:
     i3 = positive(random)
@@ -36,11 +38,10 @@ def test_printed_and_stable_forms_agree_for_t_below_0_and_on_the_smooth_branch_a
 
 
 def test_on_the_printed_branch_omega_1_has_the_wrong_sign_after_0() -> None:
-    case = PartialCase(Fraction(1), Fraction(6), Fraction(1))
-    smooth, printed = (exact_claim(case, Fraction(1, 3), branch) for branch in ("smooth", "printed"))
+    smooth, printed = (exact_claim(SIX, Fraction(1, 3), branch) for branch in ("smooth", "printed"))
     assert printed.omega[0] > 0 > smooth.omega[0]
     assert printed.omega[0].overlaps(-smooth.omega[0])
-    before = [exact_claim(case, Fraction(-1, 3), branch) for branch in ("smooth", "printed")]
+    before = [exact_claim(SIX, Fraction(-1, 3), branch) for branch in ("smooth", "printed")]
     assert before[0].omega[0].overlaps(before[1].omega[0])
 
 
@@ -89,39 +90,33 @@ def test_the_partial_case_satisfies_the_relations_of_4_1() -> None:
 
 @pytest.mark.parametrize("ratio", [2, 6])
 def test_printed_psi_in_double_has_under_four_digits_at_36_and_none_from_38(ratio: int) -> None:
-    case = PartialCase(Fraction(1), Fraction(ratio), Fraction(1))
+    case = {2: TWO, 6: SIX}[ratio]
     for sign in (-1, 1):
-        at = {
-            kt: evaluation_error(case, sign * Fraction(kt) / case.solves.rate, DOUBLE, "printed") for kt in (36, 38, 60)
-        }
-        psi = float(abs(exact_claim(case, sign * Fraction(36) / case.solves.rate, "printed").psi))
-        assert float(at[36].psi) / psi > 1e-4
-        assert not at[38].psi.is_finite()
-        assert not at[60].psi.is_finite()
+        times = {kt: sign * Fraction(kt) / case.solves.rate for kt in (36, 38, 60)}
+        errors = [evaluation_error(case, time, DOUBLE, "printed").psi for time in times.values()]
+        assert float(errors[0]) / float(abs(exact_claim(case, times[36], "printed").psi)) > 1e-4
+        assert [error.is_finite() for error in errors] == [True, False, False]
 
 
 @pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, QUAD, real(237)], ids=lambda p: p.name)
 def test_the_stable_forms_keep_full_precision_everywhere(precision) -> None:
-    case = PartialCase(Fraction(1), Fraction(6), Fraction(1))
     for kt in (-800, -100, -36, -1, Fraction(-1, 1000), Fraction(1, 1000), 1, 36, 100, 800):
-        error = evaluation_error(case, Fraction(kt) / case.solves.rate, precision, "stable")
+        error = evaluation_error(SIX, Fraction(kt) / SIX.solves.rate, precision, "stable")
         scale = max(6, abs(float(kt)))
         for value in (error.omega, error.phi, error.theta, error.psi):
             assert float(value) <= 4 * float(precision.eps) * scale
 
 
 def test_printed_formulas_overflow_in_double_at_709() -> None:
-    case = PartialCase(Fraction(1), Fraction(2), Fraction(1))
-    assert evaluation_error(case, Fraction(-709), DOUBLE, "printed").omega.is_finite()
-    assert not evaluation_error(case, Fraction(-710), DOUBLE, "printed").omega.is_finite()
-    assert evaluation_error(case, Fraction(-710), EXTENDED, "printed").omega.is_finite()
+    for time, precision, is_finite in ((-709, DOUBLE, True), (-710, DOUBLE, False), (-710, EXTENDED, True)):
+        assert evaluation_error(TWO, Fraction(time), precision, "printed").omega.is_finite() is is_finite
 
 
 def test_6_1_divides_by_0_at_the_start() -> None:
     with numpy.errstate(divide="ignore"):
         u = number(Fraction(0), DOUBLE)
         assert numpy.isinf(1 / (u * u))
-    assert not exact_claim(PartialCase(Fraction(1), Fraction(2), Fraction(1)), Fraction(0), "smooth").phi.is_finite()
+    assert not exact_claim(TWO, Fraction(0), "smooth").phi.is_finite()
 
 
 def test_the_first_failure_is_the_time_from_which_on_nothing_is_finite() -> None:

@@ -8,6 +8,8 @@ import pytest
 import heavytop as ht
 from support.helpers import START, TOP
 
+pytestmark = pytest.mark.slow
+
 ROWS = [[Fraction(n, 3) for n in row] for row in ((2, -1, 2), (2, 2, -1), (-1, 2, 2))]
 SKEW = ht.Body(1, 1, ("1/2", "1/3", "1/5"), (3, 2, 1, "1/5", 0, "1/7"), about="pivot")
 TILTED = ht.State(omega=("1/10", "2/5", "9/10"), attitude=ht.Attitude.euler("ZXZ", "1/3", "1/2", "1"))
@@ -22,7 +24,6 @@ def body() -> ht.Body:
     return ht.Body(1, 1, rotated(TOP.centre), tensor, about="pivot")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {"integrator": "multiword"}, {"digits": 25}], ids=str)
 def test_turned_axes_have_the_same_events(options) -> None:
     start = ht.State(rotated(START.omega), rotated(START.gamma))
@@ -38,7 +39,6 @@ def test_turned_axes_have_the_same_events(options) -> None:
     assert abs(turned.to_numpy() - expected).max() < 1e-13
 
 
-@pytest.mark.slow
 def test_irrational_axes_and_attitudes_are_proven_and_agree_with_the_reference() -> None:
     known = ht.events(SKEW, TILTED, 10, "gamma3 = 1/4", digits=30)
     assert known.method == "validated: Taylor enclosure of irrational data"
@@ -56,7 +56,6 @@ def test_irrational_axes_and_attitudes_are_proven_and_agree_with_the_reference()
     assert abs(sampled.times - found.times).max() < 1e-12
 
 
-@pytest.mark.slow
 def test_a_section_and_pictures_of_a_body() -> None:
     assert ht.poincare(SKEW, TILTED, 5, "gamma3 = 1/4", 0).on_one_level
     times = np.arange(1, 21) / 4
@@ -70,7 +69,6 @@ def test_a_section_and_pictures_of_a_body() -> None:
     assert abs(np.where(np.isnan(drawn[0]), drawn[1], drawn[0]) - along).max() < 1e-12
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("system", ["gyrostat", "heavy_gyrostat"])
 def test_rotors_are_followed(system) -> None:
     if system == "gyrostat":

@@ -16,9 +16,8 @@ from heavytop.measure.reference import reference
 from heavytop.precision import DOUBLE, QUAD, Precision, decimal_text
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
+from support.helpers import START, TOP
 
-TOP = HeavyTop((3, 2, 1), 1, (Fraction(1, 2), Fraction(1, 3), Fraction(1, 5)))
-START = State((Fraction(1, 10), Fraction(2, 5), Fraction(9, 10)), (Fraction(3, 5), 0, Fraction(4, 5)))
 TIMES = [Fraction(k, 2) for k in range(1, 21)]
 RIGHT = motion(TOP, START, HEAVY_TOP, TIMES)
 OMEGA, GAMMA = np.array([1.0] * 3 + [0.0] * 3), np.array([0.0] * 3 + [1.0] * 3)
