@@ -25,6 +25,7 @@ BITS = 110
 TILTED = [["0.5", "0.1", "-0.05"], ["0.1", "0.7", "0.02"], ["-0.05", "0.02", "0.9"]]
 TOP = ht.Body("15", "9.81", (0, 1, 0), ("0.234375", "0.46875", "0.234375"), "centre of mass")
 SPINNING = ht.State(omega=("0", "150", "-4.61538"), attitude=ht.Attitude.quaternion(1, 0, 0, 0))
+MOVING = ht.State((1, 2, -3), attitude=ht.Attitude.quaternion(1, 0, 0, 0))
 LOPSIDED = ht.Body("2", "9.81", ("0.1", "-0.2", "0.3"), TILTED, "pivot")
 
 
@@ -128,12 +129,11 @@ def test_what_is_left_of_a_tensor_is_far_below_its_smallest_moment(power: int) -
 
 
 def test_a_moment_far_below_the_rounding_is_an_answer_or_a_refusal() -> None:
-    start = ht.State((1, 2, -3), attitude=ht.Attitude.quaternion(1, 0, 0, 0))
     body = ht.Body(1, 1, (0, 0, 1), thin(Fraction(1, 10**100)), "pivot")
-    found = resolve(body, start, 80)
+    found = resolve(body, MOVING, 80)
     assert found.uncertainty.rate > 0
     with pytest.raises(OutOfReach, match="times as fast"):
-        ht.reference(body, start, [1], 20)
+        ht.reference(body, MOVING, [1], 20)
     with pytest.raises(InputError, match="factor above 1e300"):
         _ = ht.Body(1, 1, (0, 0, 1), thin(Fraction(1, 10**320)), "pivot").top
 
@@ -154,7 +154,7 @@ def test_axes_under_every_renaming_give_the_same_motion() -> None:
 
 @pytest.mark.parametrize("bits", [80, 400])
 def test_what_rounding_moves_is_bounded_and_small(bits: int) -> None:
-    found = resolve(LOPSIDED, ht.State((1, 2, -3), attitude=ht.Attitude.quaternion(1, 0, 0, 0)), bits)
+    found = resolve(LOPSIDED, MOVING, bits)
     assert 0 < found.uncertainty.rate < Fraction(1, 2) ** (bits - 20)
     assert 0 < max(found.uncertainty.start) < Fraction(1, 2) ** (bits - 8)
 
@@ -169,9 +169,8 @@ def test_an_enclosure_that_ignores_the_rounding_misses_the_true_motion() -> None
     """A planted fault: data rounded to 40 bits without their uncertainty give balls that do not hold the truth."""
     from heavytop.exact.enclosure.run import Validated
 
-    start = ht.State((1, 2, -3), attitude=ht.Attitude.quaternion(1, 0, 0, 0))
-    true = BodyMotion(LOPSIDED, start).state(Fraction(2), 120)
-    coarse = resolve(LOPSIDED, start, 40)
+    true = BodyMotion(LOPSIDED, MOVING).state(Fraction(2), 120)
+    coarse = resolve(LOPSIDED, MOVING, 40)
     blind = in_body_axes(coarse, Validated(coarse.top, coarse.start).state(Fraction(2), 120))
     assert not contains(true, blind, Fraction(1, 10**25))
     honest = Validated(coarse.top, coarse.start, xi=coarse.xi, uncertainty=coarse.uncertainty)

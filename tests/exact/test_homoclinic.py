@@ -16,6 +16,7 @@ from support.helpers import positive
 from support.proofs import assert_overlap
 
 T, S = sympy.symbols("T S")
+BOTH = [ErshkovPartial(Fraction(3, 4), Fraction(5), Fraction(2)), DeloneHomoclinic(Fraction(3, 4), Fraction(5))]
 
 
 def derivative(expression, rate):
@@ -58,7 +59,7 @@ def test_the_delone_motion_solves_the_heavy_top_identically() -> None:
         assert [float(v) for v in known.state(time, 60)] == pytest.approx([float(v.subs(at)) for v in y], abs=1e-14)
 
 
-@pytest.mark.parametrize("known", [ErshkovPartial(Fraction(3, 4), Fraction(5), Fraction(2)), DeloneHomoclinic(Fraction(3, 4), Fraction(5))])  # fmt: skip # noqa: E501
+@pytest.mark.parametrize("known", BOTH)
 def test_angles_and_attitude_agree_with_the_state_on_both_sides_of_the_pole(known) -> None:
     for time in (Fraction(-3), Fraction(-1, 7), Fraction(1, 9), Fraction(4)):
         state, (phi, theta, psi) = known.state(time, 150), known.angles(time, 150)
@@ -69,7 +70,7 @@ def test_angles_and_attitude_agree_with_the_state_on_both_sides_of_the_pole(know
         assert_overlap(xi, known.attitude(time, 150))
 
 
-@pytest.mark.parametrize("known", [ErshkovPartial(Fraction(1), Fraction(6), Fraction(1)), DeloneHomoclinic(Fraction(1), Fraction(2))])  # fmt: skip # noqa: E501
+@pytest.mark.parametrize("known", BOTH)
 def test_the_start_is_the_state_at_0_and_the_end_is_the_saddle(known) -> None:
     assert [midpoint(v) for v in known.state(Fraction(0), 100)] == list(known.start.flat)
     assert known.start.require_unit_gamma()

@@ -14,10 +14,9 @@ import pytest
 from typer.testing import CliRunner
 
 import heavytop as ht
-from heavytop import DOUBLE, GYROSTAT, HEAVY_GYROSTAT, HeavyTop, InputError, Outcome, State
+from heavytop import DOUBLE, HEAVY_GYROSTAT, HeavyTop, InputError, Outcome, State
 from heavytop.cases import CASES
 from heavytop.cli import app
-from heavytop.exact.cases.gyrostat import Gyrostat
 from heavytop.exact.cases.staude import Staude
 from heavytop.exact.catalogue import find
 from heavytop.exact.closed_form import orientation, permuted, renamed_state, renamed_top
@@ -110,34 +109,6 @@ def test_a_motion_of_an_ensemble_is_right_whatever_runs_beside_it(name) -> None:
         np.testing.assert_allclose(run.to_numpy(), alone.to_numpy(), rtol=0, atol=1e-14)
     plain = ht.propagate(tops[-1], starts[-1], [1], integrator="words")
     np.testing.assert_allclose(runs[-1].to_numpy(), plain.to_numpy(), rtol=0, atol=1e-14)
-
-
-@pytest.mark.slow
-def test_the_papers_gyrostat_is_the_case_without_weight_in_balls_and_in_every_format() -> None:
-    """Ω here is Ω + λ e2 there, k = (0, −I2 λ, 0), n = 0; γ is the same."""
-    case = CASES["gyrostat"]
-    closed = Gyrostat.of(case.top, case.start)
-    rate = GYROSTAT.parameters(case.top, case.start).rotor
-    top = HeavyTop(case.top.inertia, 0, (0, 0, 0), (0, -case.top.inertia[1] * rate, 0))
-    w1, w2, w3 = case.start.omega
-    start = State((w1, w2 + rate, w3), case.start.gamma)
-    for time in (F(9, 2), F(-2)):
-        here = Validated(top, start, HEAVY_GYROSTAT).state(time, 160)
-        there = closed.state(time, 160)
-        for axis, (ours, theirs) in enumerate(zip(here, there, strict=True)):
-            shift = rate if axis == 1 else F(0)
-            off = abs(midpoint(ours) - midpoint(theirs) - shift)
-            assert off <= radius(ours) + radius(theirs) < F(1, 10**40)
-    for name, forms in FORMATS.items():
-        for form in ("double", "quad"):
-            precision = parse(form)
-            if form not in forms or ht.available()[precision.family] is not None:
-                continue
-            ours = ht.propagate(top, start, [2], precision, integrator=name)
-            theirs = ht.propagate(case.top, case.start, [2], precision, integrator=name, system="gyrostat")
-            shifts = [F(0), rate, *[F(0)] * 4]
-            for a, b, shift in zip(ours.states[0], theirs.states[0], shifts, strict=True):
-                assert abs(exact(a) - exact(b) - shift) <= 16 * precision.eps
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from heavytop.integrate.heyoka.motions import Stepper, propagate
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import exact, number
 from heavytop.top.attitude import perpendicular
-from support.helpers import bits
+from support.helpers import PAPER, bits
 
 TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
 START = State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5"))
@@ -82,9 +82,7 @@ def test_a_looser_tolerance_takes_fewer_steps_of_lower_order() -> None:
 
 
 def test_the_problem_is_rounded_once_and_the_rotor_comes_from_the_exact_data() -> None:
-    top = HeavyTop((3, 5, 7), "1/3", (0, "1/7", 0))
-    start = State([Fraction(2, 7) * 11 / 3, Fraction(3, 7) * 11 / 5, Fraction(6, 7) * 11 / 7], ("2/7", "3/7", "6/7"))
-    problem = Problem.of(top, start, DOUBLE, GYROSTAT)
+    problem = Problem.of(*PAPER, DOUBLE, GYROSTAT)
     assert problem.parameters.rotor == exact(number(Fraction(1, 21 * 11), DOUBLE))
     assert problem.parameters.moment == (0, exact(number(Fraction(1, 21), DOUBLE)), 0)
     assert problem.top.moment == problem.parameters.moment

@@ -7,7 +7,7 @@ from random import Random
 
 import pytest
 
-from heavytop import DOUBLE, DOUBLE_DOUBLE, GYROSTAT, QUAD, HeavyTop, Outcome, State
+from heavytop import DOUBLE, DOUBLE_DOUBLE, QUAD, HeavyTop, Outcome, State
 from heavytop.integrate.multiword import lanes
 from heavytop.integrate.multiword.lanes import propagate_multiword_ensemble
 from heavytop.integrate.multiword.motions import propagate_multiword
@@ -114,14 +114,3 @@ def test_observer_and_finished_are_called_in_order() -> None:
     assert sorted(over) == list(range(9))
     assert all(times == [Fraction(t) for t in TIMES] for times in seen.values())
     assert all(len(run.states) == 0 and len(run.times) == 4 for run in runs)
-
-
-@pytest.mark.slow
-def test_the_gyrostat_goes_in_lanes_too() -> None:
-    top = HeavyTop((3, 5, 7), "1/3", (0, "1/7", 0))
-    omega = [Fraction(n, 7) * 11 / i for n, i in zip((2, 3, 6), (3, 5, 7), strict=True)]
-    start = State(omega, ("2/7", "3/7", "6/7"))
-    given = [Problem.of(top, start, DOUBLE_DOUBLE, GYROSTAT)] * 2
-    alone = propagate_multiword(top, start, TIMES, DOUBLE_DOUBLE, system=GYROSTAT)
-    for run in propagate_multiword_ensemble(given, TIMES):
-        assert distance(run, alone) < Fraction(1, 10**29)

@@ -38,6 +38,13 @@ DATA = {
 VECTORS = json.loads((Path(__file__).parents[1] / "data" / "vectors.json").read_text("utf-8"))
 
 
+PAPER = (
+    HeavyTop((3, 5, 7), "1/3", (0, "1/7", 0)),
+    State([Fraction(2, 7) * 11 / 3, Fraction(3, 7) * 11 / 5, Fraction(6, 7) * 11 / 7], ("2/7", "3/7", "6/7")),
+)
+"""A gyrostat of the paper, with γ along M and |M| = 11."""
+
+
 def fraction(random: Random, low: int = -30, high: int = 30) -> Fraction:
     """A rational that is not 0, with a small denominator."""
     return Fraction(random.choice([n for n in range(low, high + 1) if n]), random.randint(1, 13))
