@@ -13,6 +13,8 @@ from heavytop.exact.catalogue import find
 from rational_motions import grioli_motion, staude_motion
 from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational, triple
 
+GRIOLI = grioli_motion(Fraction(1, 3), Fraction(1, 4), Fraction(2, 7), Fraction(3, 2))
+
 
 def random_grioli(seed):
     rng = random.Random(seed)
@@ -29,29 +31,26 @@ def random_staude(seed):
 
 
 def test_a_grioli_top_is_asymmetric_and_its_attitude_turns_with_it():
-    motion = grioli_motion(Fraction(1, 3), Fraction(1, 4), Fraction(2, 7), Fraction(3, 2))
-    assert len(set(motion.top.inertia)) == 3
-    assert_attitude(motion, Fraction(5, 3))
-    assert_narrow(motion, Fraction(10**9))
+    assert len(set(GRIOLI.top.inertia)) == 3
+    assert_attitude(GRIOLI, Fraction(5, 3))
+    assert_narrow(GRIOLI, Fraction(10**9))
 
 
 def test_grioli_takes_any_length_of_gamma():
-    motion = grioli_motion(Fraction(1, 3), Fraction(1, 4), Fraction(2, 7), Fraction(3, 2))
-    top = HeavyTop(motion.top.inertia, Fraction(1, 7), motion.top.centre)
-    assert_solves(Grioli(top, State(motion.start.omega, [7 * g for g in motion.start.gamma])), Fraction(3))
+    top = HeavyTop(GRIOLI.top.inertia, Fraction(1, 7), GRIOLI.top.centre)
+    assert_solves(Grioli(top, State(GRIOLI.start.omega, [7 * g for g in GRIOLI.start.gamma])), Fraction(3))
 
 
 def test_what_is_not_grioli_is_refused_with_the_test_that_failed():
-    motion = grioli_motion(Fraction(1, 3), Fraction(1, 4), Fraction(2, 7), Fraction(3, 2))
-    omega, gamma = motion.start.omega, motion.start.gamma
+    omega, gamma = GRIOLI.start.omega, GRIOLI.start.gamma
     with pytest.raises(NotInClass, match=r"P b = 1\."):
-        Grioli(HeavyTop((3, 2, 1), 1, (1, 1, 1)), motion.start)
+        Grioli(HeavyTop((3, 2, 1), 1, (1, 1, 1)), GRIOLI.start)
     with pytest.raises(NotInClass, match="times the difference = -3"):
-        Grioli(HeavyTop((3, 2, 1), 1, (1, 0, 2)), motion.start)
+        Grioli(HeavyTop((3, 2, 1), 1, (1, 0, 2)), GRIOLI.start)
     with pytest.raises(NotInClass, match="difference of spin and precession"):
-        Grioli(motion.top, State((omega[0], omega[1] + 1, omega[2]), gamma))
+        Grioli(GRIOLI.top, State((omega[0], omega[1] + 1, omega[2]), gamma))
     with pytest.raises(NotInClass, match=r"gamma as it follows from Omega, but the difference = \(1/7, 0, 0\)"):
-        Grioli(motion.top, State(omega, (gamma[0] + Fraction(1, 7), *gamma[1:])))
+        Grioli(GRIOLI.top, State(omega, (gamma[0] + Fraction(1, 7), *gamma[1:])))
     with pytest.raises(InputError, match="No Grioli top"):
         grioli_motion(Fraction(1, 3), Fraction(1, 3), Fraction(0), Fraction(1))
 

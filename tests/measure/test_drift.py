@@ -31,13 +31,13 @@ from support.helpers import in_units
 
 TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
 START = State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5"))
+PROBLEM = Problem.of(TOP, START, DOUBLE)
 START_DOUBLES = tuple(map(float, START.flat))
 
 
 def test_the_rms_lies_between_final_and_maximum_and_the_series_holds_the_kept_times() -> None:
-    problem = Problem.of(TOP, START, DOUBLE)
     keep = [Fraction(10), Fraction(100)]
-    drift = Drift(problem, holding(TOP, START), keep)
+    drift = Drift(PROBLEM, holding(TOP, START), keep)
     propagate(TOP, START, range(1, 101), DOUBLE, observer=drift)
     for name in ("gamma_squared", "area", "energy", "kovalevskaya"):
         values = {part: exact(drift.metrics()[f"drift_{name}_{part}"].value) for part in ("max", "rms", "final")}
@@ -49,7 +49,7 @@ def test_the_rms_lies_between_final_and_maximum_and_the_series_holds_the_kept_ti
 
 
 def test_without_a_sample_the_metrics_are_missing() -> None:
-    drift = Drift(Problem.of(TOP, START, DOUBLE), holding(TOP, START))
+    drift = Drift(PROBLEM, holding(TOP, START))
     assert {m.value for m in drift.metrics().values()} == {"missing"}
     assert {m.log10 for m in drift.metrics().values()} == {None}
 
@@ -69,7 +69,7 @@ def test_a_state_that_does_not_move_has_no_drift_that_is_not_a_number(precision,
 
 
 def test_a_nan_is_never_a_number() -> None:
-    drift = Drift(Problem.of(TOP, START, DOUBLE), holding(TOP, START))
+    drift = Drift(PROBLEM, holding(TOP, START))
     drift(Fraction(1), numpy.array([float("nan")] * 6))
     drift(Fraction(2), numpy.array([float(v) for v in START.flat]))
     assert drift.metrics()["drift_energy_max"].value == "nan"
@@ -197,9 +197,8 @@ def test_an_operation_on_double_doubles_is_off_by_sixteen_squares_of_a_rounding(
 
 def test_a_drift_that_doubles_do_not_resolve_is_evaluated_in_balls(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a state that comes back to the start, and of one whose component is not finite."""
-    problem = Problem.of(TOP, START, DOUBLE)
-    rows = numpy.array([[float(value) for value in problem.start.flat]] * 160)
-    same, broken = Drift(problem, problem.integrals()), Drift(problem, problem.integrals())
+    rows = numpy.array([[float(value) for value in PROBLEM.start.flat]] * 160)
+    same, broken = Drift(PROBLEM, PROBLEM.integrals()), Drift(PROBLEM, PROBLEM.integrals())
     same.add_states(rows)
     assert {metric.value for metric in same.metrics().values()} <= {"0", "unresolved"}
     rows[7, 2] = numpy.nan
@@ -210,9 +209,8 @@ def test_a_drift_that_doubles_do_not_resolve_is_evaluated_in_balls(monkeypatch: 
 
 def test_states_that_wait_are_counted_before_anything_is_told() -> None:
     """Also where arrays and lists take turns, and more come than wait."""
-    problem = Problem.of(TOP, START, DOUBLE)
-    rows = near_the_start(problem, 2100, Random(1))
-    drift, one_by_one = Drift(problem, problem.integrals()), Drift(problem, problem.integrals())
+    rows = near_the_start(PROBLEM, 2100, Random(1))
+    drift, one_by_one = Drift(PROBLEM, PROBLEM.integrals()), Drift(PROBLEM, PROBLEM.integrals())
     one_by_one.one_by_one()
     for index, row in enumerate(rows):
         drift(Fraction(index), row.tolist() if index in (3, 1500) else row)
@@ -291,12 +289,11 @@ def evaluations_counted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 def test_a_state_that_is_not_finite_and_a_digit_that_stays_open_are_taken_one_by_one(monkeypatch) -> None:
-    problem = Problem.of(TOP, START, DOUBLE)
     for value in (float("nan"), 0.5):
         wide = Truth(
             Against("computed"), lambda time, bits: [to_ball(x).union(to_ball(x + 0.001)) for x in START_DOUBLES]
         )
-        scorer, counted = Scorer(problem, wide), evaluations_counted(monkeypatch)
+        scorer, counted = Scorer(PROBLEM, wide), evaluations_counted(monkeypatch)
         for time in range(1, 41):
             scorer(Fraction(time), numpy.array([*START_DOUBLES[:5], value]))
         assert (scorer.metrics()["drift_energy_max"].value == "nan") == (value != value)

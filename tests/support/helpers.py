@@ -21,7 +21,7 @@ from heavytop.integrate import registry
 from heavytop.integrate.registry import IntegratorSource
 from heavytop.integrate.trajectory import Trajectory
 from heavytop.precision import exact
-from heavytop.top.equations import HEAVY_GYROSTAT, Parameters, System
+from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 TOP = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
@@ -43,6 +43,16 @@ PAPER = (
     State([Fraction(2, 7) * 11 / 3, Fraction(3, 7) * 11 / 5, Fraction(6, 7) * 11 / 7], ("2/7", "3/7", "6/7")),
 )
 """A gyrostat of the paper, with γ along M and |M| = 11."""
+
+
+def flipped_gamma(p: Parameters, y: Sequence[Any]) -> tuple[Any, ...]:
+    """The field of the heavy top with γ' = Ω × γ."""
+    rates = HEAVY_TOP.field(p, y)
+    return (*rates[:3], *(-rate for rate in rates[3:]))
+
+
+FLIPPED = System("heavy_top", flipped_gamma, HEAVY_TOP.angular_velocity)
+"""A system that calls itself the heavy top, with a wrong sign."""
 
 
 def fraction(random: Random, low: int = -30, high: int = 30) -> Fraction:

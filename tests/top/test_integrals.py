@@ -10,7 +10,7 @@ from heavytop.precision import cross, dot
 from heavytop.top import equations
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, heavy_top, holding
 from heavytop.top.heavy_top import HeavyTop, State
-from support.helpers import fraction, moments, positive, rational, renamed, unit_vector, vector
+from support.helpers import flipped_gamma, fraction, moments, positive, rational, renamed, unit_vector, vector
 
 
 def derivative(integral, p: Parameters, y, field) -> fmpq:
@@ -90,12 +90,6 @@ def flipped_torque(p: Parameters, y):
     torque = cross(y[3:6], p.moment)
     rates[1] -= 2 * torque[1] / p.inertia[1]
     return tuple(rates)
-
-
-def flipped_gamma(p: Parameters, y):
-    """The field with γ' = Ω × γ."""
-    rates = heavy_top(p, y)
-    return (*rates[:3], *(-rate for rate in rates[3:]))
 
 
 @pytest.mark.parametrize("wrong", [flipped_torque, flipped_gamma])
