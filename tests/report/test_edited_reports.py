@@ -45,32 +45,31 @@ def one(band: float | None = 0.3, value: str = "1e-12", **changes) -> Row:
     return row(metrics={"drift_energy_max": metric}, **changes)
 
 
+NEVER = {"break_away_time": Metric("never", None, "duration")}
+SLOPE = {"break_away_slope": "1", "break_away_slope_expected": "1", "break_away_slope_off_by": "0"}
+
+
 @pytest.mark.parametrize(
-    ("measure", "factor"), [("drift", 5.0), ("growth", 6.0), ("homoclinic", 8.0), ("break_away_law", 8.0)]
+    ("measure", "others", "near", "far"),
+    [
+        ("drift", {}, 0.4995, 0.5005),
+        ("growth", {}, 0.5994, 0.6006),
+        ("homoclinic", NEVER, 0.7992, 0.8008),
+        # the noise is added there
+        ("break_away_law", {name: error(value) for name, value in SLOPE.items()}, 0.45, 1.2),
+    ],
 )
-def test_a_candidate_may_be_noisier_by_chance_and_no_more(measure: str, factor: float) -> None:
-    needed = {
-        "homoclinic": {"break_away_time": Metric("never", None, "duration")},
-        "break_away_law": {
-            "break_away_slope": error("1"),
-            "break_away_slope_expected": error("1"),
-            "break_away_slope_off_by": error("0"),
-        },
-    }.get(measure, {})
-
+def test_a_candidate_may_be_noisier_by_chance_and_no_more(
+    measure: str, others: dict[str, Metric], near: float, far: float
+) -> None:
     def noisy(band: float | None) -> Row:
-        return row(measure=measure, metrics={**needed, "drift_energy_max": replace(error("1e-9"), band=band)})
+        return row(measure=measure, metrics={**others, "drift_energy_max": replace(error("1e-9"), band=band)})
 
-    if measure == "break_away_law":  # the noise is added there
-        assert all_judged(noisy(0.1), noisy(0.1), noisy(1.2), noisy(0.45)) == ["same", "worse", "same"]
-    else:
-        assert judged(noisy(0.1), noisy(0.1 * factor * 0.999))[0] == "same"
-        assert judged(noisy(0.1), noisy(0.1 * factor * 1.001)) == (
-            "worse",
-            f"noise: {0.1 * factor:.2g} decades, not 0.1",
-        )
+    assert all_judged(noisy(0.1), noisy(0.1), noisy(near), noisy(far)) == ["same", "same", "worse"]
+    if measure != "break_away_law":
+        assert judged(noisy(0.1), noisy(far))[1] == f"noise: {far:.1f} decades, not 0.1"
         # a band too narrow to excuse anything is taken as 0.05
-        assert all_judged(noisy(0.001), noisy(0.05 * factor * 0.999), noisy(0.05 * factor * 1.001)) == ["same", "worse"]
+        assert all_judged(noisy(0.001), noisy(near / 2), noisy(far / 2)) == ["same", "worse"]
     assert judged(noisy(0.3), noisy(0.1))[0] == "same"
     assert judged(noisy(None), noisy(0.1))[0] == "same"
     assert judged(noisy(0.1), noisy(None)) == ("incomparable", "its noise is not measured, which was 0.1 decades")
@@ -489,48 +488,42 @@ def test_a_series_is_within_the_bound_of_what_is_unresolved(value: str, contradi
 
 
 PSI = "claim_evaluation_error_psi"
+COUNT, FROM = "claim_evaluation_psi_samples_not_finite", "claim_evaluation_psi_not_finite_from"
 FORMULA = {
     f"{PSI}_max_finite": error("1e-12"),
-    "claim_evaluation_psi_samples_not_finite": Metric("1", 0.0, "value"),
-    "claim_evaluation_psi_not_finite_from": Metric("100", 2.0, "duration"),
+    COUNT: Metric("1", 0.0, "value"),
+    FROM: Metric("100", 2.0, "duration"),
 }
 WORK = {"error_max": error("2e-12"), "error_final": error("1e-12")}
+OF_FORMULA = {PSI: ["1e-13", "1e-12", "nan"]}
+OF_WORK = {
+    "solution_error_omega": ["1e-13", "2e-12", "1e-13"],
+    "solution_error_gamma": ["1e-13", "1e-13", "1e-12"],
+}
 
 
 @pytest.mark.parametrize(
-    ("measure", "metrics", "field"),
+    ("field", "wrong"),
     [
-        ("claim_evaluation", {}, ""),
-        ("claim_evaluation", {f"{PSI}_max_finite": error("1.001e-12")}, f"{PSI}_max_finite"),
-        ("claim_evaluation", {f"{PSI}_max_finite": error("0.999e-12")}, f"{PSI}_max_finite"),
-        (
-            "claim_evaluation",
-            {"claim_evaluation_psi_samples_not_finite": Metric("0", None, "value")},
-            "claim_evaluation_psi_samples_not_finite",
-        ),
-        (
-            "claim_evaluation",
-            {"claim_evaluation_psi_not_finite_from": Metric("never", None, "duration")},
-            "claim_evaluation_psi_not_finite_from",
-        ),
-        ("work_precision", {}, ""),
-        ("work_precision", {"error_final": error("1.001e-12")}, "error_final"),
-        ("work_precision", {"error_final": error("0.999e-12")}, "error_final"),
-        ("work_precision", {"error_max": error("1.99e-12")}, "error_max"),
+        *((f"{PSI}_max_finite", error(size)) for size in ("1.001e-12", "0.999e-12")),
+        (COUNT, Metric("0", None, "value")),
+        (FROM, Metric("never", None, "duration")),
+        *(("error_final", error(size)) for size in ("1.001e-12", "0.999e-12")),
+        ("error_max", error("1.99e-12")),
     ],
 )
-def test_the_numbers_of_formulas_and_of_runs_are_those_of_their_series(measure, metrics, field) -> None:
-    ends = {
-        "claim_evaluation": {PSI: ["1e-13", "1e-12", "nan"]},
-        "work_precision": {
-            "solution_error_omega": ["1e-13", "2e-12", "1e-13"],
-            "solution_error_gamma": ["1e-13", "1e-13", "1e-12"],
-        },
-    }[measure]
-    known = FORMULA if measure == "claim_evaluation" else WORK
-    series = {name: Series(TIMES, values) for name, values in ends.items()}
-    made = row(measure=measure, finite=measure == "work_precision", metrics=known | metrics, series=series)
-    assert [problem.partition(":")[0] for problem in contradictions(made)] == ([field] if field else [])
+def test_the_numbers_of_formulas_and_of_runs_are_those_of_their_series(field: str, wrong: Metric) -> None:
+    of_run = field in WORK
+    known, values = (WORK, OF_WORK) if of_run else (FORMULA, OF_FORMULA)
+    series = {name: Series(TIMES, each) for name, each in values.items()}
+    measure = "work_precision" if of_run else "claim_evaluation"
+
+    def wrong_fields(metrics: dict[str, Metric]) -> list[str]:
+        made = row(measure=measure, finite=of_run, metrics=dict(metrics), series=dict(series))
+        return [problem.partition(":")[0] for problem in contradictions(made)]
+
+    assert wrong_fields(known) == []
+    assert wrong_fields(known | {field: wrong}) == [field]
 
 
 def _compared_both_ways(start: Path, candidate: Path) -> list[object]:
