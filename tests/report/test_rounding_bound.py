@@ -52,9 +52,7 @@ def test_the_bound_is_what_it_says_in_the_units_of_each_quantity() -> None:
     # the rate of FREE is 4, over 100 units of time
     turns, log = 401, math.log10
     drift, turned = 2 + EPS + log(turns) / 2, 2 + EPS + log(turns) * 1.5
-    amplified = max(
-        0.0, log(amplification(HEAVY_TOP, Parameters((4, 2, 1), (0, 0, 0), 0), flat(FREE), Fraction(100)) / turns)
-    )
+    amplified = max(0.0, log(amplified_by(FREE, 100) / turns))
     assert edge(bound(), "drift", "gamma_squared") == pytest.approx(drift + log(3), abs=1e-6)
     assert edge(bound(), "drift", "energy") == pytest.approx(drift + log((4 + 2 + 1) * 16 / 2), abs=1e-6)
     assert edge(bound(), "drift", "area") == pytest.approx(drift + log((4 + 2 + 1) * 4), abs=1e-6)
@@ -69,8 +67,11 @@ def test_the_bound_is_what_it_says_in_the_units_of_each_quantity() -> None:
     assert edge(backwards, "drift", "energy") == edge(bound(), "drift", "energy")
 
 
-def flat(data: Data) -> tuple[Fraction, ...]:
-    return tuple(map(Fraction, (*data.omega, *data.gamma)))
+def amplified_by(data: Data, time: int) -> float:
+    """The largest factor of an error up to the time, of a top of weight 0 or 1."""
+    inertia, centre = (tuple(map(Fraction, each)) for each in (data.inertia, data.centre))
+    start = tuple(map(Fraction, (*data.omega, *data.gamma)))
+    return amplification(HEAVY_TOP, Parameters(inertia, centre, Fraction(0)), start, Fraction(time))
 
 
 @pytest.mark.slow
@@ -100,9 +101,7 @@ def test_a_saddle_explains_errors_as_far_as_they_count_but_no_drift() -> None:
 
 def test_beyond_what_double_follows_a_chaotic_motion_may_be_amplified_faster_by_half() -> None:
     far = {"data": UPRIGHT, "horizon": "60", "time_reached": "60", "bits": 237}
-    found = math.log10(
-        amplification(HEAVY_TOP, Parameters((1, 1, Fraction(1, 2)), (0, 0, 1), 0), flat(UPRIGHT), Fraction(60))
-    )
+    found = math.log10(amplified_by(UPRIGHT, 60))
     expected = 2 + EPS - 184 * math.log10(2) + math.log10(121) / 2 + found + 0.5 * (found - math.log10(FOLLOWED))
     assert found > 25
     assert edge(bound(**far), "solution_error", "gamma") == pytest.approx(expected, abs=1e-5)
