@@ -57,9 +57,8 @@ def row(**changes: object) -> Row:
 
 def claim_rows(verdict: str = "refuted") -> list[Row]:
     """Audit, model, evaluation and integration of a claim."""
-    value = {"refuted": Metric("0", None, "value"), "holds": Metric("1", 0.0, "value")}.get(
-        verdict, Metric("unresolved", None, "value")
-    )
+    text = {"refuted": "0", "holds": "1"}.get(verdict, "unresolved")
+    value = Metric(text, 0.0 if verdict == "holds" else None, "value")
     holds = {"(1.1).1 smooth all": Metric("1", 0.0, "value")}
     common = {"horizon": "8", "time_reached": "8", "steps": 0, "laws": {}, "flags": {}, "seconds": {}}
     audit = row(case="c", measure="audit", integrator="audit", precision="exact", bits=0, series={}, **common)
