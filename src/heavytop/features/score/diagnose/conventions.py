@@ -556,21 +556,16 @@ def _fitted(samples: Observations, simulated: SimulatedMotion) -> Iterator[Row]:
 
 def _turned(samples: Observations, simulated: SimulatedMotion) -> Iterator[Row]:
     """A constant rotation of the axes of space, or of the body."""
-    for form in FORMS:
-        if form not in samples.columns:
-            continue
-        rotations = samples.said.rotations(form, samples.columns[form])
-        if not numpy.isfinite(rotations).all():
-            return
-        space = nearest_rotation((rotations @ simulated.rotation.transpose(0, 2, 1)).mean(axis=0))
-        body = nearest_rotation((simulated.rotation.transpose(0, 2, 1) @ rotations).mean(axis=0))
-        plain = replace(samples.said, up="z")
-        if samples.said.up == "z":
-            turned = replace(plain, space=_square(space))
-            yield "space_turned", {"angle": _angle(space)}, {"columns": turned, **_FITTED}
-        turned = replace(samples.said, body=_square(body.T))
-        yield "body_turned", {"angle": _angle(body)}, {"columns": turned, **_FITTED}
+    said = samples.said
+    form = next((form for form in FORMS if form in samples.columns), None)
+    rotations = None if form is None else said.rotations(form, samples.columns[form])
+    if rotations is None or not numpy.isfinite(rotations).all():
         return
+    space = nearest_rotation((rotations @ simulated.rotation.transpose(0, 2, 1)).mean(axis=0))
+    body = nearest_rotation((simulated.rotation.transpose(0, 2, 1) @ rotations).mean(axis=0))
+    if said.up == "z":
+        yield "space_turned", {"angle": _angle(space)}, {"columns": replace(said, space=_square(space)), **_FITTED}
+    yield "body_turned", {"angle": _angle(body)}, {"columns": replace(said, body=_square(body.T)), **_FITTED}
 
 
 def _angle(matrix: Array) -> str:
