@@ -141,6 +141,7 @@ def test_show_and_compare_print_for_people(finished: Path) -> None:
 def test_a_command_that_is_printed_can_be_pasted(finished: Path, tmp_path: Path) -> None:
     shutil.copytree(finished / "one", tmp_path / "a b")
     assert "heavytop show 'a b' --full" in printed("show", "a b", cwd=tmp_path)
+    assert "Next: cd 'c d'; " in printed("new", "c d", cwd=tmp_path)
 
 
 def test_checkpoints_are_not_seconds_of_nan_apart(tmp_path: Path) -> None:

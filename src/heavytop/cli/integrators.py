@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from shlex import quote
 from textwrap import fill
 from typing import Annotated, Any
 
@@ -79,7 +80,7 @@ def new(
     print(fill(f"{made}: {', '.join(files)}", 80, subsequent_indent="  ", **_WHOLE_WORDS))
     build = "" if language == "python" else f"{LANGUAGES[language].build}; "
     first = "cat README.md" if engine else f"{build}heavytop check-integrator mine.toml"
-    print(f"Next: cd {made}; {first}; heavytop gate --bless")
+    print(f"Next: cd {quote(str(made))}; {first}; heavytop gate --bless")
     return ExitCode.GOOD
 
 

@@ -304,3 +304,9 @@ def test_states_of_an_iterator_are_read_once() -> None:
     assert scores == scores[:1] * 3
     with pytest.raises(InputError, match="normalize = 'yes' is not a bool"):
         ht.score(TIMES, given["states"], top=case.top, start=case.start, normalize="yes")
+
+
+@pytest.mark.parametrize("key", ["weight", "inertia", "rotor"])
+def test_a_key_that_is_null_is_not_said_to_be_missing(key: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=f"The key {key} is null"):
+        row_of(tmp_path, document() | {key: None})

@@ -567,14 +567,14 @@ def _vector(document: dict[str, Any], key: str, case: Case | None) -> list[Any]:
 def _list(document: dict[str, Any], key: str, count: int | None = None) -> list[Any]:
     value = document.get(key)
     if value is None:
-        raise InputError(f"The key {key} is missing.", REMEDY)
+        raise InputError(f"The key {key} is {'null' if key in document else 'missing'}.", REMEDY)
     return observed_columns.listed(value, key, count)
 
 
 def _text(document: dict[str, Any], key: str, default: str | None = None) -> str:
     value = document.get(key, default)
     if value is None:
-        raise InputError(f"The key {key} is missing.", REMEDY)
+        raise InputError(f"The key {key} is {'null' if key in document else 'missing'}.", REMEDY)
     if not isinstance(value, str):
         raise InputError(f"{key} is a {type(value).__name__}.", "Give text or a number.")
     return value
