@@ -167,7 +167,8 @@ class Point:
 class Lattice:
     """A lattice of discriminant other than 0, at one working precision.
 
-    roots: the values e of ℘ at z = 1/2, (1 + τ)/2, τ/2.  half_period: ω, the smallest positive real one.  ratio: τ.
+    roots: the values e of ℘ at z = 1/2, (1 + τ)/2, τ/2; at 1/2, τ/2, (1 + τ)/2 where two are complex.
+    half_period: ω, the smallest positive real one.  ratio: τ.
     zero: θ1'(0), θ2(0), θ3(0), θ4(0).
     theta: the series for numbers, None where the nome is large (a long real period, near a double root).
     parts: their polynomials, of T, raised and the last two thetas of :class:`Point`.
