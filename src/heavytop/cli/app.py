@@ -141,7 +141,7 @@ def require_apart(files: Iterable[Path | None], *read: Path | None) -> None:
     """Raise InputError if an output is given twice, or is an input, or of the report in a folder that is one."""
     written = [path for path in files if path is not None]
     sources = [path / name for path in read if path and written for name in ("", "report.json", "report.json.sha256")]
-    used = {absolute(source).resolve() for source in sources}
+    used = {absolute(source).resolve() for source in sources if not source.is_dir()}
     for path in written:
         target = absolute(path).resolve()
         if target in used:

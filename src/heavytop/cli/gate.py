@@ -47,7 +47,8 @@ def gate(
     from heavytop.report.render.comparison import comparison
 
     trusted, fresh, rules = absolute(baseline), absolute(out), policy_of(plan, policy)
-    require_apart((out,), baseline)
+    if fresh.resolve() == trusted.resolve():
+        raise InputError(f"{out} is named twice.", "Give the new report another folder than the baseline.")
     code = Path(integrator.partition(":")[0]) if integrator else None
     require_apart((markdown, junit, html), baseline, out, rules, Path(plan), code)
     command_line = join(["heavytop", *sys.argv[1:], "--bless"])
