@@ -14,6 +14,7 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import lru_cache
+from itertools import pairwise
 from operator import itemgetter
 from threading import Lock
 from typing import TYPE_CHECKING
@@ -158,7 +159,7 @@ class _Path:
     """
 
     def __init__(self, linear: Doubles, products: Doubles, start: Doubles) -> None:
-        self._linear, self._twice = linear if linear.any() else None, 2 * products.reshape(36, 6)
+        self._series = _Series(linear, products)
         self._steps = [(0.0, 1.0, 1.0)]
         kind = start.dtype
         self._state, self._carried, self._sizes = start, numpy.empty((6, 0, 6), kind), numpy.empty((0, 6), kind)
@@ -183,13 +184,14 @@ class _Path:
     def _advance(self) -> bool:
         """Take one step; False at the end: where Φ overflows, the time does not advance or all digits are lost."""
         time, largest, lost = self._steps[-1]
-        series = _series(self._linear, self._twice, self._state)
+        series = self._series(self._state)
         last = max(float(numpy.abs(series[order]).max()) ** (1 / order) for order in (_ORDER - 1, _ORDER))
         if not last:
             self._steps.append((math.inf, largest, lost))
             return False
         step = _TOLERANCE ** (1 / _ORDER) / last
-        combined = numpy.tensordot(self._state.dtype.type(step) ** numpy.arange(_ORDER + 1), series, 1)
+        powers = self._state.dtype.type(step) ** numpy.arange(_ORDER + 1)
+        combined = numpy.dot(powers[None], series.reshape(_ORDER + 1, -1)).reshape(6, 7)
         carried = numpy.concatenate([self._carried, numpy.eye(6)[:, None]], 1).reshape(6, -1)
         with numpy.errstate(over="ignore", invalid="ignore"):
             self._carried = (combined[:, 1:] @ carried).reshape(6, -1, 6)
@@ -214,25 +216,35 @@ def _path(system: System, parameters: Parameters, start: tuple[Fraction, ...], f
     return _Path(linear.astype(kind), products.astype(kind), state.astype(kind))
 
 
-def _series(linear: Doubles | None, twice: Doubles, state: Doubles) -> Doubles:
-    """Taylor coefficients of (y, Φ) from y and Φ = 1, shape (order + 1, 6, 7).
+class _Series:
+    """Taylor coefficients of (y, Φ) from y and Φ = 1, shape (order + 1, 6, 7), in memory that the next call reuses.
 
     (n + 1) Φ_(n+1) = Σ_m J_m Φ_(n−m) with J_m = 2 B(y_m, ·), and L in J_0; of y itself half of the products.
-
-    linear: L; None where it is 0.  twice: 2 B, shape (36, 6).
     """
-    kind = state.dtype
-    series, jacobians = numpy.empty((_ORDER + 1, 6, 7), kind), numpy.empty((6, 6 * _ORDER), kind)
-    series[0, :, 0], series[0, :, 1:] = state, numpy.eye(6)
-    columns, shares = series.reshape(-1, 7), numpy.array([0.5, 1, 1, 1, 1, 1, 1])
-    for n in range(_ORDER):
-        offset = 6 * (_ORDER - 1 - n)  # the latest first, in the order of the sum
-        jacobians[:, offset : offset + 6] = (twice @ series[n, :, 0]).reshape(6, 6)
-        sums = shares * (jacobians[:, offset:] @ columns[: 6 * n + 6])
-        if linear is not None:
-            sums += linear @ series[n]
-        numpy.divide(sums, n + 1, out=series[n + 1])
-    return series
+
+    def __init__(self, linear: Doubles, products: Doubles) -> None:
+        kind = products.dtype
+        self._linear, self._twice = linear if linear.any() else None, 2 * products.reshape(36, 6)
+        self._coefficients, self._sums = numpy.empty((_ORDER + 1, 6, 7), kind), numpy.empty((6, 7), kind)
+        self._coefficients[0, :, 1:] = numpy.eye(6)
+        jacobians, columns = numpy.empty((6, 6 * _ORDER), kind), self._coefficients.reshape(-1, 7)
+        latest = range(6 * (_ORDER - 1), -1, -6)  # the latest Jacobian first, in the order of the sum
+        self._recurrence = [
+            (jacobians[:, first : first + 6], jacobians[:, first:], columns[: 6 * n], current, following)
+            for n, (first, (current, following)) in enumerate(zip(latest, pairwise(self._coefficients), strict=True), 1)
+        ]
+
+    def __call__(self, state: Doubles) -> Doubles:
+        self._coefficients[0, :, 0] = state
+        sums, twice, linear = self._sums, self._twice, self._linear
+        for n, (jacobian, jacobians, columns, current, following) in enumerate(self._recurrence, 1):
+            jacobian[:] = (twice @ current[:, 0]).reshape(6, 6)
+            numpy.matmul(jacobians, columns, out=sums)
+            sums[:, 0] *= 0.5
+            if linear is not None:
+                sums += linear @ current
+            numpy.divide(sums, n, out=following)
+        return self._coefficients
 
 
 def digits_eaten(factor: float) -> float:
