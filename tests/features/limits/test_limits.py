@@ -17,6 +17,7 @@ from support.in_process import heavytop
 FLIP = ht.HeavyTop(("919/15000", "967/15000", "83/15000"), 0, (0, 0, 0)), ht.State((10, 0, "1e-10"), (0, 0, 1))
 LAGRANGE = CASES["lagrange"].top, CASES["lagrange"].start
 BODY = ht.Body("2", "9.81", ("0.1", "0", "0.3"), (1, 2, "1.5", "0.1", "-0.1", "0.2"), "pivot")
+SLOW = ht.State((0, 0, 1), (1, 0, 0))
 SPINNING = ht.State(omega=(1, 2, 3), attitude=ht.Attitude.quaternion(1, 0, 0, 0))
 
 
@@ -45,14 +46,21 @@ def test_digits_of_a_regular_motion_stay_and_an_equilibrium_loses_none() -> None
 
 
 def test_interpolation_of_a_steady_rotation_is_known_in_closed_form() -> None:
-    """γ = (cos t, −sin t, 0): linear 1 − cos(Δ/2), Hermite and Lagrange Δ⁴/384 and 3 Δ⁴/128, slerp 0."""
-    turning = ht.HeavyTop((2, 2, 1), 0, (0, 0, 0)), ht.State((0, 0, 1), (1, 0, 0))
+    """γ = (cos t, −sin t, 0): linear 1 − cos(Δ/2), Hermite Δ⁴/384, Lagrange Δ⁴/24 in the end intervals, slerp 0."""
+    turning = ht.HeavyTop((2, 2, 1), 0, (0, 0, 0)), SLOW
     found = ht.between_samples(*turning, 10, "1/10", "1e-3")
     assert found.errors["linear"] == pytest.approx(1 - math.cos(0.05), rel=0.01)
     assert found.errors["hermite"] == pytest.approx(0.1**4 / 384, rel=0.01)
-    assert found.errors["lagrange"] == pytest.approx(3 * 0.1**4 / 128, rel=0.01)
+    assert found.errors["lagrange"] == pytest.approx(0.1**4 / 24, rel=0.02)
     assert (found.errors["slerp"] or 0) < 1e-14
     assert float(found.largest["linear"] or 0) == pytest.approx(2 * math.acos(1 - 1e-3), rel=0.01)
+
+
+def test_a_slow_motion_needs_no_sample_but_its_ends() -> None:
+    """γ = (cos t, −sin t, 0) up to 1/10: linear 1.3e-3, Hermite 2.6e-7, Lagrange with three intervals 5.2e-8."""
+    largest = ht.between_samples(ht.HeavyTop((2, 2, 1), 0, (0, 0, 0)), SLOW, "1/10", "1/10", "1e-2").largest
+    whole, third = Fraction(1, 10), Fraction(1, 30)
+    assert largest == {"slerp": whole, "linear": whole, "hermite": whole, "lagrange": third}
 
 
 def test_the_largest_spacing_keeps_to_the_error_and_the_next_does_not() -> None:

@@ -132,7 +132,12 @@ def _compared(y: Array, q: Array, slopes: Array) -> dict[str, float | None]:
         errors = {name: _relative(value, true) for name, value in candidates.items()}
         errors["slerp"] = float(_angles(_slerp(turns[:, :-1], turns[:, 1:], u), q[:, part::_PARTS]).max())
         if nodes.shape[1] > 3:
-            errors["lagrange"] = _relative(_lagrange(nodes, u), true[:, 1:-1])
+            stencils = (
+                (nodes, u, slice(1, -1)),
+                (nodes[:, :4], u - 1, slice(1)),
+                (nodes[:, -4:], u + 1, slice(-1, None)),
+            )
+            errors["lagrange"] = max(_relative(_lagrange(four, v), true[:, at]) for four, v, at in stencils)
         largest |= {name: max(largest[name] or 0.0, error) for name, error in errors.items()}
     return largest if nodes.shape[1] > 3 else largest | {"lagrange": None}
 
@@ -142,7 +147,7 @@ def _relative(value: Array, true: Array) -> float:
 
 
 def _lagrange(nodes: Array, u: float) -> Array:
-    """Interpolation on inner intervals by the two samples on either side."""
+    """Interpolation by four successive samples at u from the second, in Δt: inner intervals have u from 0 to 1."""
     w, x, y, z = (nodes[:, k : nodes.shape[1] - 3 + k] for k in range(4))
     weights = (-u * (u - 1) * (u - 2) / 6, (u + 1) * (u - 1) * (u - 2) / 2, -(u + 1) * u * (u - 2) / 2)
     return weights[0] * w + weights[1] * x + weights[2] * y + (u + 1) * u * (u - 1) / 6 * z
@@ -170,12 +175,12 @@ def _largest(errors: Any, name: str, target: float, end: Fraction, count: int) -
         error = errors(count)[name]
         return error is not None and error <= target
 
-    high = low = min(_MOST, max(4, math.ceil(count * ((errors(count)[name] or 1) / target) ** (1 / _ORDERS[name]))))
+    high = low = min(_MOST, max(1, math.ceil(count * ((errors(count)[name] or 1) / target) ** (1 / _ORDERS[name]))))
     while not within(high):
         if high == _MOST:
             return None
         low, high = high, min(high + max(1, high // 16), _MOST)
-    while low > 4 and within(low):
+    while low and within(low):
         low, high = low - max(1, low // 16), low
     while high - low > 1:
         middle = (low + high) // 2
