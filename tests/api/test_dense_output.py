@@ -1,5 +1,7 @@
 """A finished run as a function of the time, and its attitudes as SciPy has them."""
 
+import copy
+import pickle
 import sys
 
 import numpy as np
@@ -61,3 +63,22 @@ def test_attitudes_go_to_scipy_and_back(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setitem(sys.modules, "scipy.spatial.transform", None)
     with pytest.raises(ht.InputError, match=r"Rotations need SciPy.\s+Install it"):
         run.rotations()
+
+
+@pytest.mark.parametrize("precision", ["double", "extended", "quad", "real:200"])
+@pytest.mark.parametrize("change", [copy.copy, copy.deepcopy, lambda run: pickle.loads(pickle.dumps(run))])
+def test_a_run_comes_back_from_another_process_whole(change, precision: str) -> None:
+    run = ht.propagate(TOP, START, [1, 2], precision, attitude=True)
+    again = change(run)
+    assert again.texts() == run.texts()
+    assert again.texts("quaternion") == run.texts("quaternion")
+    assert (again(0.3) == run(0.3)).all()
+    assert change(again).texts() == run.texts()
+
+
+def test_records_with_arrays_are_equal_only_to_themselves() -> None:
+    """As a ``Trajectory`` is: an array has no truth value to compare records by."""
+    for record in (ht.Integrator(TOP).propagate(START, [1, 2]), ht.power(TOP, START, 1, "1e-3")):
+        assert record == record
+        assert record != copy.deepcopy(record)
+        assert len({record, copy.deepcopy(record)}) == 2

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 from typing import Any, TypeAlias, TypedDict, Unpack, cast
 
 import numpy
@@ -18,7 +19,7 @@ from heavytop.exact.bodies import Finder
 from heavytop.exact.catalogue import find
 from heavytop.exact.enclosure.run import EFFORT
 from heavytop.integrate import registry
-from heavytop.integrate.dense import Dense, dense, dense_output
+from heavytop.integrate.dense import Dense, DenseOutput, dense
 from heavytop.integrate.frames import Setup
 from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.motions import states_at
@@ -187,14 +188,13 @@ def _dense(
     setup: Setup, which: str | Any, until: Fraction, options: Mapping[str, Any]
 ) -> Callable[[Fraction], Sequence[Any]]:
     """(Ω, γ) of the run at any time, in the axes given."""
-    limits = options.get("tolerance"), options.get("step_limit")
+    limits = options.get("xi"), options.get("tolerance"), options.get("step_limit")
+    return DenseOutput(partial(_run_again, setup, which, until, *limits), setup.in_body_axes)
 
-    def run() -> Dense:
-        problem = Problem.of(setup.top, setup.start, setup.precision, setup.system, options.get("xi"))
-        return dense(which, problem, until, *limits)
 
-    output = dense_output(run)
-    return lambda time: setup.in_body_axes(output(time))
+def _run_again(setup: Setup, which: str | Any, until: Fraction, xi: Any, *limits: Any) -> Dense:
+    problem = Problem.of(setup.top, setup.start, setup.precision, setup.system, xi)
+    return dense(which, problem, until, *limits)
 
 
 def motion(
@@ -376,7 +376,7 @@ _LARGEST = float(LARGEST)
 _SLACK = float(arguments.slack_of(DOUBLE))
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Propagated(Tabular):
     """Motions of one top at the times asked for, as arrays of the format's numbers.
 

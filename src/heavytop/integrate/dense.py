@@ -10,7 +10,7 @@ from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cache, partial
+from functools import cached_property, partial
 from time import perf_counter
 from typing import Any
 
@@ -256,27 +256,34 @@ def dense(
     return Dense(steps_of, problem, end, tolerance, step_limit)
 
 
-def dense_output(make: Callable[[], Dense]) -> Callable[[Fraction], list[Any]]:
-    """(Ω, γ) of a finished run, numbers of the format, as a function of the time; InputError outside of the run.
+@dataclass(frozen=True)
+class DenseOutput:
+    """(Ω, γ) of a finished run as a function of the time; InputError outside of the run.
 
-    make: the run up to its last time, whose steps are repeated at the first call and kept.
+    make: the run up to its last time, whose steps are repeated at the first call and kept, but neither pickled nor
+    copied.  axes: from numbers of the format in principal axes to those that are returned.
     """
 
-    @cache
-    def steps() -> tuple[Dense, list[Piece]]:
-        run = make()
+    make: Callable[[], Dense]
+    axes: Callable[[list[Any]], Sequence[Any]]
+
+    @cached_property
+    def _steps(self) -> tuple[Dense, list[Piece]]:
+        run = self.make()
         return run, [*run.pieces()]
 
-    def state(time: Fraction) -> list[Any]:
-        run, pieces = steps()
+    def __reduce__(self) -> tuple[Any, ...]:
+        return DenseOutput, (self.make, self.axes)
+
+    def __call__(self, time: Fraction) -> Sequence[Any]:
+        run, pieces = self._steps
         sign, end = (1 if run.until > 0 else -1), run.reached
         if not 0 <= sign * time <= abs(end):
             raise InputError(f"t = {decimal_text(time, 6)} is not in the run.", f"Give 0 to {decimal_text(end, 6)}.")
         problem = run.problem
         if not time or not pieces:
-            return [*problem.native(problem.start.flat)]
+            return self.axes([*problem.native(problem.start.flat)])
         piece = pieces[max(0, bisect_left(pieces, sign * time, key=lambda piece: sign * piece.began) - 1)]
         part = (time - piece.began) / piece.length
-        return [number(value, problem.precision) for value in piece.state(fmpq(part.numerator, part.denominator))]
-
-    return state
+        state = piece.state(fmpq(part.numerator, part.denominator))
+        return self.axes([number(value, problem.precision) for value in state])

@@ -31,7 +31,7 @@ _MOST = 100_000
 _G = Fraction("9.8") / Fraction("9.81")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class PlantedFault:
     """A planted fault and its detection.
 
@@ -45,7 +45,7 @@ class PlantedFault:
     tolerance: float
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Power(Tabular):
     """The faults that a test detects.
 
