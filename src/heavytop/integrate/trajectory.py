@@ -486,9 +486,10 @@ class Trajectory(Tabular, InSpace):
 
     @property
     def amplification(self) -> float:
-        """The largest factor by which the motion itself has amplified a change of its state up to ``time_reached``,
-        whenever that was made.
+        """The factor by which the motion itself has amplified a change of its state, between the two times up to
+        ``time_reached`` where it is largest.
 
+        The root mean square over the six directions of a change; the worst direction has at most √6 times that.
         An estimate from the variational equation, computed when it is asked for.
         """
         from heavytop.top.amplification import amplification
