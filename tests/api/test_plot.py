@@ -92,6 +92,13 @@ def test_phase_planes_and_sections(run) -> None:
     assert len(lines(ht.plot.poincare(one))[0]) == len(one)
 
 
+def test_the_axis_of_a_run_backwards_is_that_of_the_size_of_its_times() -> None:
+    back, times = ht.propagate(GENERIC, TUMBLING, [-1, -2]), ["-1", "-2"]
+    for axes in (ht.plot.digits(back, ht.reference(GENERIC, TUMBLING, times, 25)), ht.plot.drift(back)):
+        assert axes.get_xlabel() == "|t| (time units)"
+        assert list(axes.lines[0].get_xdata()) == [1, 2]
+
+
 @pytest.mark.slow
 def test_drift_digits_and_error_are_those_of_the_score(run, known) -> None:
     score = ht.score(TIMES, run.states, top=LAGRANGE, start=START, precision=ht.DOUBLE)

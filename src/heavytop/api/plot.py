@@ -319,8 +319,8 @@ def digits(
     format_digits = problem.precision.bits * np.log10(2)
     logs = sample_errors(problem, times, states, truth)["relative"]
     right = [format_digits if log is None else float(np.clip(-log, 0, format_digits)) for log in logs]
-    drawn, instants = _flat(axes), np.abs(np.array([float(time) for time in times]))
-    drawn.plot(instants, right, color=colour, lw=_WIDTH, label=label)
+    drawn, instants = _flat(axes), np.array([float(time) for time in times])
+    drawn.plot(abs(instants), right, color=colour, lw=_WIDTH, label=label)
     drawn.set_title(f"{problem.precision.name}, {run.integrator}", fontsize="medium")
     _time_axis(drawn, instants)
     drawn.set(ylabel="digits right", ylim=(0, max(format_digits * 1.05, drawn.get_ylim()[1])))
@@ -529,7 +529,7 @@ def _named(name: str) -> str:
 
 def _time_axis(axes: Axes, times: NDArray[np.float64]) -> None:
     """Label the axis of |t|, logarithmic over two decades or more."""
-    positive = times[times > 0]
+    positive = abs(times[times != 0])
     if len(positive) and positive.max() >= _SPAN * positive.min():
         axes.set_xscale("log")
     axes.set_xlabel(_TIME if (times >= 0).all() else "|t| (time units)")
@@ -537,16 +537,13 @@ def _time_axis(axes: Axes, times: NDArray[np.float64]) -> None:
 
 def _logarithmic(axes: Axes, times: NDArray[np.float64], curves: dict[str, Logs]) -> None:
     """Draw curves over time from decimal logarithms, which may be beyond the range of doubles."""
-    backwards = bool((times < 0).any())
     for index, (name, logs) in enumerate(curves.items()):
         values = np.array([np.nan if log is None else log for log in logs])
         exact_zero = bool(np.isnan(values).all())
         colour, dash = COLOURS[index % len(COLOURS)], _DASHES[index % len(_DASHES)]
         label, marker = f"{name}: exactly 0" if exact_zero else name, "." if np.isnan(values).any() else ""
         axes.plot(abs(times), values, marker=marker, ms=3, color=colour, lw=_WIDTH, ls=dash, label=label)
-    _time_axis(axes, abs(times))
-    if backwards:
-        axes.set_xlabel("|t| (time units)")
+    _time_axis(axes, times)
     decades(axes.yaxis)
     axes.legend(frameon=False, fontsize="small")
 
@@ -577,7 +574,7 @@ def stability(top: HeavyTop | Body, axes: Axes3D | None = None, *, speed: float 
             unstable = steady is not None and steady.verdict == "unstable"
             colour = _GREY if steady is None else COLOURS[1] if unstable else COLOURS[0]
             drawn.plot(*([value] for value in direction), "o", color=colour)
-            words = "not steady" if steady is None else steady.verdict + (f" {steady.rate:.3g}" if unstable else "")
+            words = "not steady" if steady is None else steady.verdict + (f" {steady.rate:.3g}" if steady.rate else "")
             drawn.text(
                 *(1.2 * value for value in direction), f"{'−' if sign < 0 else ''}{axis + 1}: {words}", fontsize=7
             )

@@ -144,6 +144,8 @@ def test_pictures_show_each_fault_each_method_and_each_axis() -> None:
         words = [text.get_text() for text in ht.plot.stability(body).texts]
         assert len(words) == 6
         assert sum(word.endswith(": unstable 0.577") for word in words) == 2
+    shown = [text.get_text() for text in ht.plot.stability(ht.HeavyTop((2, 2, 3), 0, (0, 0, 0))).texts]
+    assert sum(word.endswith(": unstable") for word in shown) == 4  # it turns away in proportion to t: no rate
 
 
 def test_a_spacing_that_is_reduced_is_said_to_be() -> None:
