@@ -49,7 +49,8 @@ def evaluate(expression: sympy.Expr, values: Mapping[sympy.Symbol, Fraction], bi
         if isinstance(e, Defined):
             return visit(e.meaning)
         if e.is_Symbol:
-            return ball(values[e])
+            value = values[e]
+            return visit(value) if isinstance(value, sympy.Expr) else ball(value)
         if e is sympy.pi:
             return arb.pi()
         if e is sympy.E:

@@ -57,7 +57,7 @@ def rate_along(rates: Mapping[sympy.Symbol, sympy.Expr]) -> Callable[[sympy.Expr
 
 def rationals(values: Mapping[sympy.Symbol, Fraction]) -> dict[sympy.Symbol, sympy.Rational]:
     """Exact values for SymPy."""
-    return {symbol: sympy.Rational(value) for symbol, value in values.items()}
+    return {symbol: sympy.sympify(value) for symbol, value in values.items()}
 
 
 def rational_values(

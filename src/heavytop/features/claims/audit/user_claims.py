@@ -306,14 +306,14 @@ def _with_times(clock: Clock, content: ClaimFile) -> Clock:
 
 # Exact states on the conditions of a claim whose file gives none: by elimination and a small search.
 #
-# A linear variable is eliminated, a polynomial in one variable gives its rational roots, and otherwise a variable gets
-# a value from a short list.  The states are only proposals: the caller proves that they lie on the conditions.
+# A linear variable is eliminated, a polynomial in one variable gives its rational roots and those of its quadratic
+# factors, and otherwise a variable gets a value from a short list.  The states are only proposals: the caller proves
+# that they lie on the conditions.
 
 
 # with points of the unit circle and sphere, such as (3/5, 4/5) and (2/3, 1/3, 2/3)
 _VALUES = tuple(sympy.Rational(*pair) for pair in ((2, 3), (1, 3), (4, 5), (3, 5), (-1, 2), (2, 1), (1, 1), (0, 1)))
-# 0 for conditions with irrational numbers, whose only rational point may be 0
-_SCALES = (1, -1, 1, -1, 20, -20, 0)
+_SCALES = (1, -1, 1, -1, 20, -20)
 _MOST_STEPS = 300
 _MOST_STATES = 24
 
@@ -323,7 +323,10 @@ def states_on(
     variables: Sequence[sympy.Symbol],
     parameters: Mapping[sympy.Symbol, Fraction],
 ) -> Iterator[dict[sympy.Symbol, Fraction]]:
-    """Rational values of ``variables`` where polynomial ``conditions`` are 0 at these parameters, as far as found."""
+    """Values of ``variables`` where polynomial ``conditions`` are 0 at these parameters, as far as found.
+
+    A value is a Fraction or an irrational number of SymPy; the states with Fractions alone come first.
+    """
     numbers = rationals(parameters)
     # states with a divisor 0 are rejected by the caller
     equations = [
@@ -332,14 +335,15 @@ def states_on(
         for condition in conditions
     ]
     if all(is_small_polynomial(equation) and equation.free_symbols <= set(variables) for equation in equations):
-        yield from _Search(variables).states(equations)
+        for field in "QR":
+            yield from _Search(variables, field).states(equations)
 
 
 class _Search:
-    """A depth-first search with a limited number of steps."""
+    """A depth-first search with a limited number of steps, for states of rational or real numbers: "Q" or "R"."""
 
-    def __init__(self, variables: Sequence[sympy.Symbol]) -> None:
-        self._variables = tuple(variables)
+    def __init__(self, variables: Sequence[sympy.Symbol], numbers: str) -> None:
+        self._variables, self._numbers = tuple(variables), numbers
         self._steps = 0
 
     def states(self, equations: Sequence[sympy.Expr]) -> Iterator[dict[sympy.Symbol, Fraction]]:
@@ -373,7 +377,8 @@ class _Search:
             if solved := self._linear([factor]):
                 yield (*solved, 0)
             elif len(symbols) == 1:
-                yield from ((symbols[0], root, 0) for root in sympy.Poly(factor, symbols[0]).ground_roots())
+                roots = sympy.roots(factor, symbols[0], filter=self._numbers, cubics=False, quartics=False)
+                yield from ((symbols[0], root, 0) for root in roots)
             else:
                 # the variable of the highest power gets a value first, which leaves the simplest equation
                 x = max(symbols, key=lambda symbol: (sympy.degree(factor, symbol), str(symbol)))
@@ -397,8 +402,8 @@ class _Search:
             numbers = {
                 x: known[x].subs(values, simultaneous=True) if x in known else values[x] for x in self._variables
             }
-            if all(number.is_Rational for number in numbers.values()):
-                yield {x: Fraction(number) for x, number in numbers.items()}
+            if all(number.is_Rational or (number.is_real and self._numbers == "R") for number in numbers.values()):
+                yield {x: Fraction(n) if n.is_Rational else n for x, n in numbers.items()}
 
 
 # A first integral or an invariant relation claimed in a file as statements.
