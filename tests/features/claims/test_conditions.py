@@ -1,6 +1,7 @@
 """A proof has conditions: what is undefined, not real, jumps or is not kept by the flow never holds, and is named."""
 
 import json
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
@@ -91,6 +92,36 @@ def test_a_side_condition_that_the_flow_leaves_refutes_with_a_witness(condition)
     # no state lies on it: nothing is shown to leave it
     off = audited(integral("gamma1^2 + gamma2^2 + gamma3^2", FREE, [condition], ["1 1 2 1 0 0"]))
     assert off.verdict == "undecided"
+
+
+@pytest.mark.parametrize(
+    ("value", "where"),
+    [
+        ("gamma1", ("Omega1", "Omega2", "gamma2")),
+        ("Omega2^2", ()),
+        ("Omega2^2", ("Omega1^2",)),
+        ("exp(3*Omega2) - 1", ()),
+        ("5*Omega2/(1 + gamma1^2)", ()),
+        ("Omega3", ("gamma1^4", "gamma3")),
+    ],
+)
+def test_a_rate_that_refutes_is_that_of_the_formula_it_is_said_to_be_of(value, where):
+    report = audited(integral(value, top("3 2 4", "1 0 0"), where, kind="relation"))
+    assert report.verdict == "refuted"
+    for row in report.rows:
+        assert row.witness is not None
+        w1, w2, w3, g1, g2, g3 = (float(Fraction(x)) for x in row.witness["parameters"].values())
+        rates = {
+            "Omega1": -2 * w2 * w3 / 3,
+            "Omega2": (w3 * w1 + g3) / 2,
+            "Omega3": (w1 * w2 - g2) / 4,
+            "gamma1": g2 * w3 - g3 * w2,
+            "gamma2": g3 * w1 - g1 * w3,
+            "gamma3": g1 * w2 - g2 * w1,
+        }
+        left, _, kept = row.residual.removeprefix("the flow leaves ").partition(" = 0, at the rate ")
+        named = left if kept else row.statement.partition("d(")[2].partition(")/dt")[0] or value
+        assert abs(float(row.witness["value"]) - rates[named]) < 1e-12
 
 
 @pytest.mark.parametrize(

@@ -194,13 +194,14 @@ def _judge_one(statement: Statement, setting: Setting, prover: Prover) -> Statem
         proof = prover.field(statement, statement.domain.sign, strict=bool(statement.domain.sign))
         closed = None if proof is None else _closed_form(statement, setting, proof)
         return _row(statement, False, closed or f"{witness['value']} at the witness", conditions, witness)
-    for text, rate in statement.flow.kept if statement.flow is not None else ():
-        # where the rate is 0 at a witness, its own rate may not be
-        rates = (rate, statement.flow.rate(rate)) if statement.flow is not None else ()
-        witness = next((w for r in rates for w in _witnesses(replace(statement, residual=r), setting, prover)), None)
-        if witness is not None:
-            residual = f"the flow leaves {text} = 0, at the rate {witness['value']} at the witness"
-            return _row(statement, False, residual, conditions, witness)
+    kept = () if statement.flow is None else statement.flow.kept
+    for order, derivative in enumerate(("the rate", "the second derivative")):
+        for text, rate in kept:
+            residual = rate if not order or statement.flow is None else statement.flow.rate(rate)
+            witness = next(_witnesses(replace(statement, residual=residual), setting, prover), None)
+            if witness is not None:
+                left = f"the flow leaves {text} = 0, at {derivative} {witness['value']} at the witness"
+                return _row(statement, False, left, conditions, witness)
     if certain:
         return _row(statement, True, "0", conditions)
     residual = "0 where the conditions are met" if proven else _bound(statement, prover)

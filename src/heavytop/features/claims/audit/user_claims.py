@@ -23,6 +23,7 @@ from heavytop.features.claims.algebra.conditions import (
     is_small_polynomial,
     on_conditions,
     reduced_everywhere,
+    written,
 )
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Assumptions, Field
@@ -494,7 +495,7 @@ class UserIntegral(FileClaim):
         needs = needs_of([self.value, *self.where]) | self.context.needs
         if system is GYROSTAT:
             needs |= self.context.rotor_needs
-        text = "dF/dt = 0 along the motion"
+        text = " = 0 along the motion"
         if self.kind == "relation":
             text += ", where F = 0"
         if self.where:
@@ -508,9 +509,10 @@ class UserIntegral(FileClaim):
         values = (*self._parts(value), *where, *rotor)
         domain = replace(ALL, points=(Fraction(0),))
         formulas = Formulas(values, named, sampled=needs)
+        parts = [(part, "dF/dt" if part == value else f"d({written(str(part))})/dt") for part in self._parts(value)]
         return [
-            Statement("dF/dt", component, "smooth", domain, self._on_relations(rate(part)), text, formulas, flow)
-            for component, part in enumerate(self._parts(value), 1)
+            Statement("dF/dt", component, "smooth", domain, self._on_relations(rate(part)), name + text, formulas, flow)
+            for component, (part, name) in enumerate(parts, 1)
         ]
 
     def _rate(self, system: System) -> Rate:
@@ -528,7 +530,7 @@ class UserIntegral(FileClaim):
         """The side conditions with their rates, and those of a relation that is split into simpler ones."""
         simpler = {formula: conditions_for_zero(formula.expression) for formula in self._zero}
         return tuple(
-            (str(formula.expression if len(parts) == 1 else part), self._on_relations(rate(part)))
+            (str(part), self._on_relations(rate(part)))
             for formula, parts in simpler.items()
             for part in parts
             if formula in self.where or parts != (self.value.expression,)
