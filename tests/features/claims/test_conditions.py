@@ -106,11 +106,12 @@ def test_a_side_condition_that_the_flow_leaves_refutes_with_a_witness(condition)
     ],
 )
 def test_a_rate_that_refutes_is_that_of_the_formula_it_is_said_to_be_of(value, where):
-    report = audited(integral(value, top("3 2 4", "1 0 0"), where, kind="relation"))
+    parts = {"kind": "relation", "parameters": {"I1": "3", "I2": "2", "I3": "4"}}
+    report = audited(integral(value, top("I1 I2 I3", "1 0 0"), where, **parts))
     assert report.verdict == "refuted"
     for row in report.rows:
         assert row.witness is not None
-        w1, w2, w3, g1, g2, g3 = (float(Fraction(x)) for x in row.witness["parameters"].values())
+        w1, w2, w3, g1, g2, g3 = (float(Fraction(x)) for x in list(row.witness["parameters"].values())[3:])
         rates = {
             "Omega1": -2 * w2 * w3 / 3,
             "Omega2": (w3 * w1 + g3) / 2,
