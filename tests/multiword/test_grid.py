@@ -8,6 +8,7 @@ from random import Random
 import numpy
 import pytest
 
+import heavytop as ht
 from heavytop.multiword.codegen.machine_code import INT, POINTER, Machine, doubles, once, pointer
 from heavytop.multiword.fixed_point import arithmetic, fixed_point_run, steps
 from heavytop.multiword.fixed_point.arithmetic import EXPONENT_BITS, Grid, digits, exact, grid_for, grid_of
@@ -223,3 +224,16 @@ def test_the_spread_is_that_of_the_smallest_component(third: Fraction) -> None:
     p = Parameters((Fraction(3), Fraction(2), Fraction(1)), (Fraction(0),) * 3, Fraction(0))
     y = (Fraction(1, 2**140), Fraction(1), third, Fraction(5, 8), Fraction(-3, 8), Fraction(11, 16))
     assert 140 <= fixed_point_run.spread(Scaled.of(HEAVY_TOP, p, y, bounded=True)) < 144
+
+
+@pytest.mark.parametrize("speed", ["0", "1e-12", "1e-30"])
+@pytest.mark.parametrize("precision", ["quad", "real:184", "real:276"])
+def test_an_order_that_nearly_vanishes_shortens_no_step(precision: str, speed: str) -> None:
+    """The third order of a pendulum from rest beside its pivot is 0, the fourth is not: 7 steps or 9 to t = 2."""
+    top, start = ht.HeavyTop((1, 1, 1), 1, (0, 0, 1)), ht.State((0, speed, 0), (1, 0, 0))
+    run = ht.propagate(top, start, [2], precision, integrator="multiword")
+    assert run.outcome is ht.Outcome.SUCCESS
+    assert run.steps < 10
+    known = ht.reference(top, start, [2], digits=35)
+    assert numpy.abs(run.to_numpy() - known.to_numpy()).max() < 1e-15
+    assert ht.score([2], run.to_numpy(), top=top, start=start).against.endswith("(proven)")

@@ -479,12 +479,14 @@ _FAR = 1 << 40
 
 
 class WordRows(Rows):
-    """A row: R, then L of each vector, K words each.  starts: from which order on u leading words are 0."""
+    """A row: R, then L of each vector, K words each.  starts: from which order on u leading words are 0, and
+    behind, how many are in the latest order.
+    """
 
     @staticmethod
     def size(grid: Grid, vectors: int, orders: int) -> ProductSize:
         row = 8 * grid.words * (1 + vectors)
-        return ProductSize(row, row * orders, 8 * grid.words, grid.words + 2)
+        return ProductSize(row, row * orders, 8 * grid.words, grid.words + 3)
 
     @staticmethod
     def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[ir.Function]:
@@ -506,6 +508,7 @@ class WordRows(Rows):
         self.code.store_one(0, self.starts, 0)
         for k in range(1, self.grid.words + 2):
             self.code.store_one(_FAR, self.starts, k)
+        self.code.store_one(0, self.starts, self.grid.words + 2)
         return wide
 
     def keep(self, n: Index, y: list[Operand], zeros: Operand, wide: Operand) -> tuple[list[Operand], Operand, Operand]:
@@ -601,7 +604,11 @@ class WordRows(Rows):
         b.position_at_end(end)
 
     def _leading_zeros(self, y: list[Operand], before: Operand) -> Operand:
-        """The number of leading words that are 0 in every lane, at most all but the last, at least ``before``."""
+        """The number of leading words that are 0 in every lane of this order and of the last, at most all but the last
+        word, at least ``before``.
+
+        A single order may vanish, or nearly, and not those behind: of a pendulum from rest every fourth does.
+        """
         code, words = self.code, self.grid.words
         count, only = code.integer(0), code.true
         for k in range(words - 1):
@@ -610,7 +617,9 @@ class WordRows(Rows):
                 largest = code.larger(code.absolute(y[words * v + k]), largest)
             only &= code.largest(largest) == 0
             count = code.select(only, k + 1, count)
-        return code.larger(count, before)
+        last = code.load_one(self.starts, words + 2)
+        code.store_one(count, self.starts, words + 2)
+        return code.larger(code.smaller(count, last), before)
 
     def _folded(self, y: list[Operand], zeros: Operand, wide: Operand) -> tuple[list[Operand], Operand]:
         """The words with those that count as 0 but are not added to the first that does not."""
