@@ -131,7 +131,7 @@ Family = Literal["any", "euler", "lagrange", "kovalevskaya", "heavy_gyrostat"]
 FAMILIES: tuple[Family, ...] = ("any", "euler", "lagrange", "kovalevskaya", "heavy_gyrostat")
 Motion = tuple[HeavyTop, State]
 MOST_TURNS = 20_000
-"""Motions of more radians, the rate times the horizon, are not tried: one costs as much as thousands of others."""
+"""Motions with a larger rate T are not tried: one costs as much as thousands of others."""
 _MOST_RATIO = 10**6
 _LARGEST = 10**30
 _BITS = 40
@@ -211,7 +211,7 @@ def changed(parent: Motion, donor: Motion, seed: str, family: Family, horizon: F
 def possible(motion: Motion, family: Family, horizon: Fraction) -> Motion | None:
     """The motion moved into the family, with numbers of 40 bits.
 
-    None where no body has its moments, where data lie beyond 1e30, or for more than :data:`MOST_TURNS` radians.
+    None where no body has its moments, where data lie beyond 1e30, or where rate T exceeds :data:`MOST_TURNS`.
     """
     top, start = motion
     inertia, centre = list(top.inertia), list(top.centre)
@@ -234,7 +234,7 @@ def possible(motion: Motion, family: Family, horizon: Fraction) -> Motion | None
 
 
 def turns(motion: Motion, horizon: Fraction) -> float:
-    """A bound on the radians that the motion turns until the horizon: its rate times the time."""
+    """rate T: the rate of the start, rounded up to a power of 2, times the horizon."""
     top, start = motion
     system = system_of(None, top)
     return float(rate(system, system.parameters(top, start), start.flat) * abs(horizon))
@@ -639,7 +639,7 @@ def _start(top: HeavyTop, start: State) -> list[str]:
 def _amplification(motion: MeasuredMotion) -> list[str]:
     chaotic = motion.amplification > 100 * (1 + motion.turns)
     kind = ", more than a regular motion does: near a separatrix, or chaotic" if chaotic else ""
-    sentences = [f"{motion.turns:.3g} radians until the horizon"]
+    sentences = [f"rate T at most {motion.turns:.3g}"]
     if digits_eaten(motion.amplification) >= _FEW or chaotic:
         sentences.append(f"the motion itself amplifies by {motion.amplification:.2g}{kind}")
     return sentences

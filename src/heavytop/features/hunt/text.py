@@ -28,7 +28,7 @@ def hunt_text(hunted: Hunted, documents: Sequence[dict[str, Any]], again: str) -
 def law_text(hunted: Hunted) -> str:
     """The law of the errors of this integrator."""
     return (
-        f"{hunted.law:.2g} eps times the motion's own amplification times the root of its radians, "
+        f"{hunted.law:.2g} eps times the motion's own amplification times √(1 + rate T), "
         "the law of nine tenths of the random tops"
     )
 
