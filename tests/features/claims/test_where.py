@@ -180,6 +180,15 @@ def test_a_relation_whose_states_are_irrational_is_refuted_at_one_of_them(a, exp
         assert abs(float(ratio * w2 * w3 + w1 * w2) - float(witness["value"])) < 1e-12
 
 
+@pytest.mark.parametrize(("factor", "expected"), [("sqrt(2)", "holds"), ("sqrt(3)", "refuted")])
+def test_conditions_with_irrational_coefficients_have_states_where_these_matter(factor, expected):
+    bobylev = integral("Omega2", top("2 5/4 1", "sqrt(2) 0 0"), (f"{factor}*gamma3 - Omega1*Omega3",), kind="relation")
+    assert audited(bobylev).verdict == expected
+    value, where = f"Omega1^2 - Omega2^2 - {factor}*gamma1", ("2*Omega1*Omega2 - sqrt(2)*gamma2",)
+    delone = integral(value, top("2 2 1", "sqrt(2) 0 0"), where, kind="relation")
+    assert audited(delone).verdict == expected
+
+
 def test_conditions_too_large_to_expand_end_at_once():
     large = f"({' + '.join(map(str, STATE))} + 1)^40 - 3"
     assert verdict("free", "Omega3", (large,)) != "holds"

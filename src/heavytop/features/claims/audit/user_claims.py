@@ -326,7 +326,7 @@ def states_on(
 ) -> Iterator[dict[sympy.Symbol, Fraction]]:
     """Values of ``variables`` where polynomial ``conditions`` are 0 at these parameters, as far as found.
 
-    A value is a Fraction or an irrational number of SymPy; the states with Fractions alone come first.
+    A value is a Fraction or an irrational number of SymPy.
     """
     numbers = rationals(parameters)
     # states with a divisor 0 are rejected by the caller
@@ -336,7 +336,9 @@ def states_on(
         for condition in conditions
     ]
     if all(is_small_polynomial(equation) and equation.free_symbols <= set(variables) for equation in equations):
-        for field in "QR":
+        # the only rational states on conditions with irrational numbers may be those where these have the factor 0
+        is_rational = all(c.is_Rational for e in equations for c in sympy.Poly(e, *variables).coeffs())
+        for field in "QR" if is_rational else "RQ":
             yield from _Search(variables, field).states(equations)
 
 
