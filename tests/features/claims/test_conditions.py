@@ -131,6 +131,9 @@ def test_a_rate_that_refutes_is_that_of_the_formula_it_is_said_to_be_of(value, w
         ("Omega1^2", ON_AXIS_1, "refuted"),
         ("Omega1", ON_AXIS_1, "refuted"),
         ("2*Omega1*gamma1 + 3*Omega2*gamma2 + 5*Omega3*gamma3", "0 0 2 1 0 0", "holds"),
+        # at gamma = e1 the rate is 0 and the second derivative -(Omega2^2 + Omega3^2) is not
+        ("gamma1 - 1", "0 0 2 1 0 0", "refuted"),
+        ("gamma1 - 1", "2 0 0 1 0 0", "undecided"),
     ],
 )
 def test_the_square_of_what_does_not_stay_0_is_no_invariant_relation(value, state, verdict):

@@ -194,10 +194,11 @@ def _judge_one(statement: Statement, setting: Setting, prover: Prover) -> Statem
         proof = prover.field(statement, statement.domain.sign, strict=bool(statement.domain.sign))
         closed = None if proof is None else _closed_form(statement, setting, proof)
         return _row(statement, False, closed or f"{witness['value']} at the witness", conditions, witness)
-    kept = () if statement.flow is None else statement.flow.kept
+    flow = statement.flow
+    kept = () if flow is None else (*flow.kept, *((("F", statement.residual),) if flow.is_relation else ()))
     for order, derivative in enumerate(("the rate", "the second derivative")):
         for text, rate in kept:
-            residual = rate if not order or statement.flow is None else statement.flow.rate(rate)
+            residual = rate if not order or flow is None else flow.rate(rate)
             witness = next(_witnesses(replace(statement, residual=residual), setting, prover), None)
             if witness is not None:
                 left = f"the flow leaves {text} = 0, at {derivative} {witness['value']} at the witness"
