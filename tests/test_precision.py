@@ -18,6 +18,7 @@ from heavytop.precision import (
     QUAD,
     available,
     decimal_text,
+    distinct_digits,
     exact,
     log10,
     native_text,
@@ -230,3 +231,17 @@ def test_a_decimal_point_is_asked_for_where_a_comma_stands() -> None:
         with pytest.raises(InputError, match="not a finite number") as refused:
             exact(text)
         assert ("Write a decimal point" in refused.value.remedy) is asked
+
+
+@pytest.mark.parametrize(
+    ("one", "texts"),
+    [
+        ("3.5", ("3.5", "3")),
+        ("3.0000000000000005", ("3.0000000000000005", "3")),
+        ("3." + "0" * 20_000 + "1", ("3 + 1E-20001", "3")),
+        ("2." + "9" * 20_000, ("3 - 1E-20000", "3")),
+    ],
+    ids=["six digits", "seventeen", "more than forty", "below"],
+)
+def test_numbers_that_differ_are_written_differently_in_few_characters(one: str, texts: tuple[str, str]) -> None:
+    assert distinct_digits(exact(one), Fraction(3)) == texts

@@ -234,13 +234,23 @@ def six_digits(value: Fraction) -> str:
     return f"{float(decimal_text(value, 6)):.6g}"
 
 
+_MOST_DISTINCT = 40
+"""Digits of a number in a sentence, beyond which the difference is written instead."""
+
+
 def distinct_digits(one: Fraction, other: Fraction) -> tuple[str, str]:
-    """Two numbers that differ, for a sentence: to six digits, or to as many as it takes to see that they differ."""
-    texts, digits = (six_digits(one), six_digits(other)), 6
-    while texts[0] == texts[1]:
-        digits += 1
+    """Two numbers that differ, for a sentence: to six digits, or to as many up to 40 as it takes to see the difference.
+
+    Beyond 40 digits the first is written as the second and the difference.
+    """
+    texts = six_digits(one), six_digits(other)
+    if texts[0] != texts[1]:
+        return texts
+    for digits in range(7, _MOST_DISTINCT + 1):
         texts = plain_decimal(one, digits), plain_decimal(other, digits)
-    return texts
+        if texts[0] != texts[1]:
+            return texts
+    return f"{texts[1]} {'+' if one > other else '-'} {decimal_text(abs(one - other), 3)}", texts[1]
 
 
 def plain_decimal(value: Fraction, digits: int) -> str:

@@ -132,7 +132,7 @@ class Reruns:
     def drift_bands(self, run: Trajectory, times: Sequence[Fraction], metrics: Metrics, true: Truth | str) -> Metrics:
         """``metrics`` of a run with their bands; unchanged if it failed, or reruns are not possible.
 
-        times: of the run.  true: the reference of its states, or why there is none.
+        times: of the run.  true: the reference of its states, or why it is missing.
         """
         if run.outcome is not Outcome.SUCCESS or not self.possible:
             return metrics

@@ -474,7 +474,7 @@ _TOO_FEW = "the closed form is certified to too few digits"
 
 @dataclass(frozen=True, slots=True)
 class EnsembleReference:
-    """The references of an ensemble: that of each start, or the reason why there is none.
+    """The references of an ensemble: that of each start, or the reason why it is missing.
 
     blur: absolute uncertainties of the states, for each start and covered time; shape (starts, samples).
     """

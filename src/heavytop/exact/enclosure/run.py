@@ -319,7 +319,7 @@ class ScaledMotion:
         return precision if needed > precision else min(precision, self.precision(max(needed, _FEWEST), inf)[0])
 
     def grid(self, precision: int) -> Grid | None:
-        """The grid of ``precision`` bits; None where there is none."""
+        """The grid of exactly ``precision`` bits, or None."""
         return next((grid for grid in _GRIDS if self.in_words and grid.total == precision), None)
 
     def seconds(self, planned: tuple[int, bool], lost: float, steps: float) -> float:
@@ -334,7 +334,7 @@ class ScaledMotion:
         return self.seconds(self.precision(bits + lost, steps), lost, steps)
 
     def certified(self, precision: int) -> CertifiedSeries | None:
-        """The Taylor coefficients on the grid of ``precision`` bits; None where there is none."""
+        """The Taylor coefficients on the grid of exactly ``precision`` bits, or None."""
         grid = self.grid(precision)
         if grid is not None and precision not in self._certified:
             certified = CertifiedSeries(self.scaled, grid, self.forwards)

@@ -55,7 +55,7 @@ def rate_along(rates: Mapping[sympy.Symbol, sympy.Expr]) -> Callable[[sympy.Expr
     return rate
 
 
-def rationals(values: Mapping[sympy.Symbol, Fraction]) -> dict[sympy.Symbol, sympy.Rational]:
+def rationals(values: Mapping[sympy.Symbol, Fraction | sympy.Expr]) -> dict[sympy.Symbol, sympy.Expr]:
     """Exact values for SymPy."""
     return {symbol: sympy.sympify(value) for symbol, value in values.items()}
 
