@@ -83,7 +83,7 @@ def test_a_run_that_stops_early_is_incomplete_and_keeps_what_it_reached() -> Non
         ({}, ["--system", "gyrostat"], "centre of mass on axis 2"),
         ({"centre": "0,1,0"}, ["--system", "gyrostat"], "parallel to M"),
         ({"centre": "0,1,0", "omega": "0,1,0"}, ["--system", "gyrostat"], "M·gamma != 0"),
-        ({}, ["--max-steps", "0"], "--max-steps = 0 allows no step"),
+        ({}, ["--max-steps", "0"], "--max-steps must be at least 1; got 0"),
         ({}, ["--integrator", "splitting:2", "--max-steps", "5"], "splitting:2 has no --max-steps"),
         ({}, ["--integrator", "splitting:4", "--tolerance", "1e-9"], "Leave it out: --step sets the accuracy"),
         ({}, ["--step", "1/9"], "Leave it out: --tolerance sets the accuracy of heyoka"),
@@ -183,7 +183,7 @@ def test_a_folder_with_other_content_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "precious.txt").write_text("keep me")
     (tmp_path / "file").write_text("")
-    for out, message in (("out", "already holds precious.txt"), ("file", "is a file")):
+    for out, message in (("out", "already contains precious.txt"), ("file", "is a file")):
         assert message in refused("run", "--plan", "plan.toml", "--out", out, cwd=tmp_path)
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["precious.txt"]
 

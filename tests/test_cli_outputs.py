@@ -205,7 +205,7 @@ def test_gimbal_lock_is_said_in_words() -> None:
         (["--show", "matrix", "--point", "1,2,3"], "no position is asked for"),
         (["--pivot", "1,2,3"], "no position is asked for"),
         (["--show", "position", "--pivot", "1,2,1e400"], "too large"),
-        (["--json", "--latex", "-"], "both print on standard output"),
+        (["--json", "--latex", "-"], "both print to standard output"),
         (["--csv", "same", "--latex", "same"], "Give two files"),
         (["--csv", "no/such/folder/file"], "cannot be written"),
     ],

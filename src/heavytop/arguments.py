@@ -51,7 +51,7 @@ _Kind = TypeVar("_Kind", HeavyTop, State)
 def is_a(value: object, kind: type[_Kind], what: str) -> _Kind:
     """``value``, checked to be of type ``kind``."""
     if not isinstance(value, kind):
-        raise InputError(f"{what} = {quoted(value)} is not a {kind.__name__}.", _TYPES)
+        raise InputError(f"{what} must be a {kind.__name__}; got {quoted(value)}.", _TYPES)
     return value
 
 
@@ -128,7 +128,8 @@ def attitude(xi: Numbers | None, start: State, form: Precision) -> tuple[Fractio
         if abs(value) > slack:
             size = float(value) if abs(value) < 10**300 else float("inf")
             raise InputError(
-                f"{what} = {size:.6g}.", "Give a unit vector perpendicular to gamma: xi is the space axis x."
+                f"xi must be a unit vector perpendicular to gamma; {what} = {size:.6g}.",
+                "Give the space axis x, in body axes.",
             )
     return attitude_vector
 
@@ -160,7 +161,7 @@ def steps(value: int | None) -> int | None:
     """A limit of steps, or None."""
     number = None if value is None else as_integer(value, "step_limit")
     if number is not None and number < 1:
-        raise InputError(f"{argument('step_limit')} = {quoted(number)} allows no step.", "Give 1 or more.")
+        raise InputError(f"{argument('step_limit')} must be at least 1; got {quoted(number)}.", "Give 1 or more.")
     return None if number is None else min(number, _MOST)
 
 
@@ -175,7 +176,7 @@ def limit(value: Number | None, what: str) -> str | None:
 def flag(value: bool | None, what: str) -> bool | None:
     """A bool, or None."""
     if value is not None and not isinstance(value, bool):
-        raise InputError(f"{what} = {quoted(value)} is not a bool.", "Give True or False.")
+        raise InputError(f"{what} must be a bool; got {quoted(value)}.", "Give True or False.")
     return value
 
 
@@ -185,7 +186,7 @@ _Call = TypeVar("_Call", bound=Callable[..., object])
 def callback(value: _Call | None, what: str) -> _Call | None:
     """Something to call, or None."""
     if value is not None and not callable(value):
-        raise InputError(f"{what} = {quoted(value)} cannot be called.", "Give a function, or None.")
+        raise InputError(f"{what} must be callable; got {quoted(value)}.", "Give a function, or None.")
     return value
 
 
@@ -197,14 +198,14 @@ def path(value: str | os.PathLike[str], what: str) -> Path:
         if "\0" in str(checked):
             raise ValueError
     except (OSError, TypeError, ValueError):  # no path, or one that no file can have
-        raise InputError(f"{what} = {quoted(value)} is not a path.", "Give text or a pathlib.Path.") from None
+        raise InputError(f"{what} must be a path; got {quoted(value)}.", "Give text or a pathlib.Path.") from None
     return checked
 
 
 def text(value: object, what: str) -> str:
     """Text."""
     if not isinstance(value, str):
-        raise InputError(f"{what} = {quoted(value)} is not text.", "Give a str.")
+        raise InputError(f"{what} must be text; got {quoted(value)}.", "Give a str.")
     return value
 
 
@@ -231,7 +232,7 @@ def required(digits: Any) -> Fraction:
     """The required digits, exact; raises InputError unless they are a positive number."""
     number = physical(digits, "require")
     if number <= 0:
-        raise InputError(f"require must be positive, got {quoted(digits)}.", "Give a number of digits, such as 9.5.")
+        raise InputError(f"require must be positive; got {quoted(digits)}.", "Give a number of digits, such as 9.5.")
     return number
 
 

@@ -69,10 +69,10 @@ def invalid(error: Exception, kind: type | None = None) -> str:
         expected = " or ".join(_TYPES.get(name, name) for name in match[1].split(" | ") if name != "null")
         # decimals of a plan are text
         is_number = match[2] == "str" and match[1].startswith(("int", "float"))
-        return f"{path} has to be {expected}" + ("" if is_number else f", and is {_TYPES.get(match[2], match[2])}")
+        return f"{path} must be {expected}" + ("" if is_number else f"; got {_TYPES.get(match[2], match[2])}")
     if match := re.fullmatch(r"Expected `([^`]*)` (?:of length )?([<>=]+) (\d+)", text):
         what = "of length " if match[1] in ("array", "str") else ""
-        return f"{path} has to be {_TYPES.get(match[1], match[1])} {what}{match[2]} {match[3]}"
+        return f"{path} must be {_TYPES.get(match[1], match[1])} {what}{match[2]} {match[3]}"
     if match := re.fullmatch(r"Object missing required field `(.*)`", text):
         return f"{path} lacks the key {match[1]}"
     if match := re.fullmatch(r"Object contains (unknown field `.*`)", text):

@@ -1,4 +1,4 @@
-"""Atomic writes of files, and lines with a checksum."""
+"""Files: reads and writes with the errors of the program, atomic writes, and lines with a checksum."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, quoted, why
+
+_RESUMABLE = "Make space, or give a writable --out; finished rows are kept for --resume."
 
 
 def without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -21,7 +23,7 @@ def without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     table = dict(pairs)
     if len(table) < len(pairs):
         twice = next(key for key, count in Counter(key for key, _ in pairs).items() if count > 1)
-        raise InputError(f"The key {quoted(twice)} stands twice in one object.", "Give each key once.")
+        raise InputError(f"The key {quoted(twice)} occurs twice in one object.", "Give each key once.")
     return table
 
 
@@ -70,6 +72,31 @@ def replace_all(contents: Sequence[tuple[Path, bytes]]) -> None:
             os.fsync(file.fileno())
 
 
+@contextmanager
+def writable(path: Path, remedy: str = _RESUMABLE) -> Iterator[None]:
+    """Report a failure to write ``path`` in this block as InputError."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {why(error)}.", remedy) from None
+
+
+@contextmanager
+def readable(path: Path | str, remedy: str, *errors: type[Exception]) -> Iterator[None]:
+    """Report a failure to read ``path`` in this block as InputError; errors: further ones than those of the system."""
+    caught: tuple[type[Exception], ...] = (OSError, UnicodeDecodeError, *errors)
+    try:
+        yield
+    except caught as error:
+        raise InputError(f"{path} cannot be read: {why(error)}.", remedy) from None
+
+
+def require_new(folder: Path, remedy: str = "Give a new folder with --out.") -> None:
+    """Raise InputError for a file, and for a folder that is not empty."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"{folder} already exists and is not an empty folder.", remedy)
+
+
 def cache_folder(name: str) -> Path:
     """The cache folder of this user; a path that cannot exist for a user without a home."""
     home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
@@ -89,16 +116,12 @@ def atomic_write(path: Path) -> Iterator[BinaryIO]:
         raise InputError(f"{path} cannot be written: it is a {what}.", "Give the name of a file.")
     temporary = path.parent / f".{path.name}.{os.getpid()}.partial"
     try:
-        with temporary.open("wb") as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except OSError as error:
-        raise InputError(
-            f"{path} cannot be written: {error.strerror}.",
-            "Make space, or give another --out; what a run finished is kept for --resume.",
-        ) from None
+        with writable(path):
+            with temporary.open("wb") as file:
+                yield file
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(temporary, path)
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)

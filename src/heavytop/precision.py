@@ -77,9 +77,11 @@ FORMATS = DOUBLE, EXTENDED, DOUBLE_DOUBLE, QUAD
 
 def real(bits: int) -> Precision:
     """The arbitrary-precision format with ``bits`` (24 to 20000) significant bits; raises InputError outside."""
-    count = as_integer(bits, "the bits of real:BITS")
+    count = as_integer(bits, "BITS of real:BITS")
     if count not in REAL_BITS:
-        raise InputError(f"real:{quoted(count)} is not a format.", "The bits of real:BITS go from 24 to 20000.")
+        raise InputError(
+            f"BITS of real:BITS must be from 24 to 20000; got {quoted(count)}.", "Give, for example, real:200."
+        )
     return Precision(f"real:{count}", count)
 
 
@@ -104,7 +106,7 @@ def as_integer(value: Any, what: str) -> int:
             return index(value)
     except Exception:  # no integer, or a foreign __index__ that raises
         pass
-    raise InputError(f"{argument(what)}: {quoted(value)} is not an integer.", "Give an integer such as 53.")
+    raise InputError(f"{argument(what)} must be an integer; got {quoted(value)}.", "Give an integer such as 53.")
 
 
 def available() -> dict[str, str | None]:
@@ -128,7 +130,8 @@ def require(precision: Precision) -> Precision:
     reason = None if precision.family == "double" else available()[precision.family]
     if reason:
         raise InputError(
-            f"Precision {precision.name} is not available: {reason}.", "`heavytop list --json` shows what is there."
+            f"Precision {precision.name} is not available: {reason}.",
+            "`heavytop list --json` shows which formats are available.",
         )
     return precision
 
@@ -219,7 +222,7 @@ def _from_mantissa(value: Any) -> Fraction:
 
 
 def _too_large(value: object) -> InputError:
-    return InputError(f"The exponent of {quoted(value)} is too large.", f"Exponents go up to {_MAX_TEXT}.")
+    return InputError(f"The exponent of {quoted(value)} is too large.", f"Use exponents up to {_MAX_TEXT}.")
 
 
 def shown(value: Fraction) -> str:
@@ -307,7 +310,7 @@ _from_short_text = lru_cache(maxsize=4096)(_from_text)
 def _from_decimal(text: str, original: str) -> Fraction:
     text = text.strip()
     if len(text) > _MAX_TEXT:
-        raise InputError(f"A number of {len(text)} characters is too long.", f"At most {_MAX_TEXT} are read.")
+        raise InputError(f"A number of {len(text)} characters is too long.", f"Use at most {_MAX_TEXT} characters.")
     match = _DECIMAL.fullmatch(text)
     if not match or not text.isascii():
         with_point = text.replace(",", ".", 1)
@@ -616,7 +619,7 @@ def ordered(values: Any, what: str, remedy: str) -> list[Any]:
             raise
         except Exception:  # not iterable: an array without dimensions, a generator that fails
             pass
-    raise InputError(f"{what} = {quoted(values)} is not a list.", remedy)
+    raise InputError(f"{what} must be a list; got {quoted(values)}.", remedy)
 
 
 def dot(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:

@@ -27,7 +27,7 @@ _SAMPLE = 600
 def number(value: Any, what: str) -> Fraction | None:
     """The exact number of decimal or hexadecimal text; None for NaN and infinities; raises InputError for others."""
     if not isinstance(value, str):
-        raise InputError(f"{what} is a {type(value).__name__}, not a number.", _REMEDY)
+        raise InputError(f"{what} must be a number; got a {type(value).__name__}.", _REMEDY)
     text = value.strip()
     if _PLAIN.fullmatch(text):
         return exact(text)
@@ -41,7 +41,7 @@ def number(value: Any, what: str) -> Fraction | None:
         with prefixed(what):
             fraction = exact(f"{fortran[1]}e{fortran[2]}" if fortran else text)
     if fraction and abs(fraction.numerator.bit_length() - fraction.denominator.bit_length()) > _WIDEST:
-        raise InputError(f"{what} is {text[:60]!r}.", f"Sizes go from 2^-{_WIDEST} to 2^{_WIDEST}.")
+        raise InputError(f"{what} must be 0 or of size 2^-{_WIDEST} to 2^{_WIDEST}; got {text[:60]!r}.", _REMEDY)
     return fraction
 
 
@@ -49,7 +49,7 @@ def finite(value: Any, what: str) -> Fraction:
     """A finite number; raises InputError also for NaN and infinities."""
     parsed = number(value, what)
     if parsed is None:
-        raise InputError(f"{what} is {value.strip()}.", "Give a finite number.")
+        raise InputError(f"{what} must be finite; got {value.strip()}.", "Give a finite number.")
     return parsed
 
 

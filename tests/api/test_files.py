@@ -20,7 +20,7 @@ def test_a_trajectory_with_a_key_twice_is_refused(again: str, tmp_path: Path) ->
     file.write_text(MOTION)
     assert read(file).top.weight == 1
     file.write_text(MOTION[:-1] + f", {again}}}")
-    with pytest.raises(ht.InputError, match=r"motion.json: The key '\w+' stands twice"):
+    with pytest.raises(ht.InputError, match=r"motion.json: The key '\w+' occurs twice"):
         read(file)
 
 
@@ -47,5 +47,5 @@ def test_a_report_with_a_key_twice_is_refused(place: str, tmp_path: Path) -> Non
     other.write_text(text.replace(place, f"{place}{json.dumps(value)},{place}", 1))
     json.loads(other.read_text())
     for reader in (store.read, store.read_brief):
-        with pytest.raises(ht.InputError, match="stands twice in one object"):
+        with pytest.raises(ht.InputError, match="occurs twice in one object"):
             reader(other)

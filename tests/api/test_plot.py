@@ -185,12 +185,12 @@ def test_what_has_no_picture_is_refused(run, known) -> None:
     short, later = ht.reference(LAGRANGE, START, [1, 2], 10), ht.reference(LAGRANGE, START, TIMES + 1, 10)
     for draw, match in (
         (lambda: ht.plot.sphere(short), "no attitude"),
-        (lambda: ht.plot.sphere(known, of="centre"), "which top"),
+        (lambda: ht.plot.sphere(known, of="centre"), "its top"),
         (lambda: ht.plot.sphere(run, of="nose"), "got 'nose'"),
         (lambda: ht.plot.sphere(ht.propagate(FREE, TUMBLING, TIMES), of="centre"), "fixed point"),
         (lambda: ht.plot.phase(run, "gamma4"), "not a component"),
         (lambda: ht.plot.drift(known), "must be a computed motion"),
-        (lambda: ht.plot.digits(run, short), "samples and the other"),
+        (lambda: ht.plot.digits(run, short), "must have the same times"),
         (lambda: ht.plot.error(run, later), "Give the same times"),
         (lambda: ht.plot.poincare(ht.events(LAGRANGE, START, 1, "omega3 = 7")), "no point"),
         (lambda: ht.plot.poincare([3]), "start must be events"),

@@ -93,7 +93,7 @@ def test_the_asymptotic_case_tends_to_its_saddle_at_its_rate() -> None:
         (f"surprise = 1\n{MEASURE}", "unknown field `surprise`"),
         (f"{MEASURE}extra = 1\n", "unknown field `extra`"),
         (f"{AUDIT}system = 'gyrostat'", "kind = 'audit' has claims, systems"),
-        (f"{AUDIT}systems = 'gyrostat'", "measure[0].systems has to be a list, and is text"),
+        (f"{AUDIT}systems = 'gyrostat'", "measure[0].systems must be a list; got text"),
         (f"{AUDIT}systems = ['wheel']", "Unknown system 'wheel'"),
         (f"{AUDIT}systems = ['heavy_gyrostat']", "The paper says nothing about heavy_gyrostat"),
         (f"{CARRIED}systems = ['gyrostat']", "sretensky-gyrostat is about heavy_gyrostat, and systems"),
@@ -102,7 +102,7 @@ def test_the_asymptotic_case_tends_to_its_saddle_at_its_rate() -> None:
         (MEASURE.replace("10", "-10"), "positive"),
         (MEASURE.replace("10", "nan"), "not a finite number"),
         (MEASURE.replace(" }", ", samples = 0 }"), "samples must be from 1"),
-        (MEASURE.replace(" }", ", samples = 1.5 }"), "has to be an integer"),
+        (MEASURE.replace(" }", ", samples = 1.5 }"), "must be an integer"),
         (f"{MEASURE}{MEASURE}", "twice"),
         (f"{TOP}{TOP}{MEASURE}", "two tops 'mine'"),
         (f"{TOP}{MEASURE}", "does not measure mine"),
@@ -163,8 +163,8 @@ quaternion = [1, 0, 0, 0]
     assert task.case.given_start.omega == (0, -1, Fraction(1, 5))
     for wrong, said in (
         ("nan", "not a finite number"),
-        ("true", "has to be text"),
-        ("[1]", "is a list"),
+        ("true", "must be text"),
+        ("[1]", "got a list"),
         ("1" * 5000, "not"),
     ):
         with pytest.raises(InputError, match=said):

@@ -109,5 +109,5 @@ def test_what_are_no_times_is_refused(times: list, message: str) -> None:
     for given in (times, np.array(times)) if all(isinstance(time, float) for time in times) else (times,):
         with pytest.raises(InputError, match=message):
             check_times(given)
-    with pytest.raises(InputError, match=r"not a list|not a number|A ndarray"):
+    with pytest.raises(InputError, match=r"must be a list|not a number|A ndarray"):
         check_times(np.ones((2, 2)))

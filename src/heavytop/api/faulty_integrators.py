@@ -104,7 +104,7 @@ class Fault:
         Raises InputError for another system, and if an attitude is requested.
         """
         if xi is not None:
-            raise InputError("A planted fault has no attitude.", "Leave out the attitude.")
+            raise InputError("Integrators with planted faults do not support the attitude.", "Leave out the attitude.")
         reached = times[: int(len(times) * self.stops)]
         run = motions.propagate(self.top(top), start, reached, precision, **self._options(system))
         states = self.states(run.states)
@@ -126,7 +126,7 @@ class Fault:
 
     def _options(self, system: System) -> dict[str, Any]:
         if system is not HEAVY_TOP:
-            raise InputError(f"The planted faults are not for {system.name}.", "Use heavy_top.")
+            raise InputError(f"Planted faults support heavy_top only; got {system.name}.", "Use heavy_top.")
         return self.options | {"stepping": self.stepping}
 
     def _disguised(self, run: Trajectory, top: HeavyTop, start: State) -> Trajectory:

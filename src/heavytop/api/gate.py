@@ -8,7 +8,7 @@ from pathlib import Path
 from heavytop.api.reports import Comparison
 from heavytop.api.run_folder import PAGE, is_written
 from heavytop.errors import InputError
-from heavytop.files import replace
+from heavytop.files import replace, writable
 from heavytop.report.compare.findings import line
 from heavytop.report.document.document import row_name
 from heavytop.report.render.comparison import headline
@@ -46,11 +46,9 @@ def bless(measured: Path, baseline: Path, summary: str, comparison: Comparison |
     """
     text = f"Begin the baseline of accuracy\n\n{summary}\n" if comparison is None else _moved(comparison)
     replace(measured / MESSAGE, text.encode())
-    try:
+    with writable(baseline, "Give a writable --baseline."):
         clear(baseline)
         shutil.copytree(measured, baseline, dirs_exist_ok=True, ignore=shutil.ignore_patterns(MESSAGE, PAGE))
-    except OSError as error:
-        raise InputError(f"{baseline} cannot be written: {error}.", "Give a writable --baseline.") from None
     return text
 
 

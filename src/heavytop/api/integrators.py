@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from heavytop.errors import InputError, quoted
 from heavytop.features import FEATURES
-from heavytop.files import replace
+from heavytop.files import replace, require_new, writable
 from heavytop.integrate.registry import named
 from heavytop.top.bodies import Body
 from heavytop.version import commit
@@ -105,21 +105,18 @@ def new_integrator(
     if engine and engine not in (known := engines()):
         raise InputError(f"engine must have an adapter; got {quoted(engine)}.", f"Use {', '.join(known)}.")
     workflow = (into or folder) / _WORKFLOW
-    try:
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            raise InputError(f"{folder} already holds other content.", "Give a new folder.")
+    with writable(folder, "Give a writable folder."):
+        require_new(folder, "Give a new folder.")
         if workflow.exists():
-            raise InputError(f"{workflow} exists already.", "Move it away, or give another --into.")
+            raise InputError(f"{workflow} already exists.", "Move it away, or give another --into.")
+        if into is not None and not folder.resolve().is_relative_to(into.resolve()):
+            raise InputError(f"{folder} is not in {into}.", "Give a folder of that repository.")
         home = "." if into is None else folder.resolve().relative_to(into.resolve()).as_posix()
         files = _adapter(engine, home) if engine else _program(language, method, home)
         for name, text in sorted(files.items()):
             path = workflow if name == _WORKFLOW else folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
             replace(path, text.encode())
-    except ValueError:
-        raise InputError(f"{folder} is not in {into}.", "Give a folder of that repository.") from None
-    except OSError as error:
-        raise InputError(f"{folder} cannot be written: {error.strerror}.", "Give a folder that can be.") from None
     return sorted(files)
 
 

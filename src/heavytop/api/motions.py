@@ -326,8 +326,8 @@ def _setups(tops: Sequence[HeavyTop | Body], starts: Sequence[State], form: Prec
     """The motions of an ensemble; a single top or start serves all of the others."""
     size = max(len(tops), len(starts))
     if not tops or not starts or {len(tops), len(starts)} - {1, size}:
-        remedy = "Give as many of each, or one for all the others."
-        raise InputError(f"There are {len(tops)} tops and {len(starts)} starts.", remedy)
+        remedy = "Give as many of each, or one that all share."
+        raise InputError(f"tops and starts must be equally many; got {len(tops)} and {len(starts)}.", remedy)
     setups = []
     for index in range(size):
         with prefixed(f"Motion {index}"):
@@ -512,7 +512,7 @@ class Integrator:
                 return array, True
         except (TypeError, ValueError):
             raise InputError(f"start must be a State or an array of numbers; got {quoted(start)}.", _SHAPES) from None
-        raise InputError(f"start has the shape {array.shape}.", _SHAPES)
+        raise InputError(f"start must have the shape (6,) or (m, 6); got {array.shape}.", _SHAPES)
 
     def _one(self, start: Any, targets: Sequence[OrderedRing]) -> tuple[Any, Outcome, Any, int]:
         """As :func:`heavytop.integrate.heyoka.motions.states_at`."""

@@ -33,6 +33,7 @@ from heavytop.api.plot_data import (
     samples,
 )
 from heavytop.errors import InputError, quoted
+from heavytop.files import writable
 from heavytop.integrate.trajectory import Trajectory
 from heavytop.measure.scorer import Logs, sample_drifts, sample_errors
 from heavytop.precision import exact
@@ -259,11 +260,12 @@ def poincare(
     for start in listed:
         if not isinstance(start, Crossings):
             raise InputError(
-                f"start must be events; got {quoted(start)}.", "Give what heavytop.poincare or heavytop.events returns."
+                f"start must be events; got {quoted(start)}.",
+                "Give the result of heavytop.poincare or heavytop.events.",
             )
     total = sum(map(len, listed))
     if not total:
-        raise InputError("The section has no point.", "Ask for a later until, or for another function.")
+        raise InputError("The section has no points.", "Give a later until, or another function.")
     drawn = _flat(axes)
     diameter = size if size is not None else float(np.clip(90 / np.sqrt(total), 2, 5))
     columns = [component(name) for name in (x, y)]
@@ -289,7 +291,7 @@ def drift(run: Trajectory, axes: Axes | None = None) -> Axes:
         InputError: for a reference, whose integrals do not drift, and as :func:`sphere`.
     """
     if not isinstance(run, Trajectory):
-        raise InputError(f"run must be a computed motion; got {quoted(run)}.", "Give what heavytop.propagate returns.")
+        raise InputError(f"run must be a computed motion; got {quoted(run)}.", "Give the result of heavytop.propagate.")
     samples(run)
     indices = every(len(run.states))
     drawn, times = _flat(axes), np.array([float(exact(run.times[index])) for index in indices])
@@ -406,12 +408,8 @@ def animate(
 
 
 def _save(film: Animation, file: Path, writer: AbstractMovieWriter | None) -> None:
-    try:
+    with writable(file, "Give a file in a writable folder."):
         film.save(file, writer=writer)
-    except OSError as problem:
-        raise InputError(
-            f"{quoted(str(file))} cannot be written: {problem.strerror}.", "Give a file in a writable folder."
-        ) from None
 
 
 def _writer(suffix: str, fps: int) -> AbstractMovieWriter:
@@ -435,7 +433,9 @@ def _flat(axes: Axes | None) -> Axes:
     if axes is None:
         axes = new_figure(6.4, 4.0).add_subplot()
     elif not hasattr(axes, "plot") or getattr(axes, "name", "") == "3d":
-        raise InputError(f"axes = {quoted(axes)} are no plane axes of matplotlib.", "Give what plt.subplots() returns.")
+        raise InputError(
+            f"axes must be two-dimensional axes of matplotlib; got {quoted(axes)}.", "Give those of plt.subplots()."
+        )
     axes.grid(visible=True, color=_GREY, alpha=0.25, lw=0.6)
     axes.set_axisbelow(True)
     for side in ("top", "right"):
@@ -448,7 +448,7 @@ def _solid(axes: Axes3D | None) -> Axes3D:
     if axes is None:
         axes = new_figure(5.2, 5.0).add_subplot(projection="3d")
     elif getattr(axes, "name", "") != "3d":
-        raise InputError(f"axes = {quoted(axes)} are no three-dimensional axes.", 'Use add_subplot(projection="3d").')
+        raise InputError(f"axes must be three-dimensional; got {quoted(axes)}.", 'Use add_subplot(projection="3d").')
     axes.view_init(_ELEVATION, _AZIMUTH)
     axes.locator_params(nbins=4)
     return axes

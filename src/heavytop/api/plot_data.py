@@ -94,9 +94,7 @@ class Samples:
         run = self.run
         if isinstance(run, Reference):
             if run.attitude is None:
-                raise InputError(
-                    "This reference has no attitude.", "Ask for it: heavytop.reference(..., attitude=True)."
-                )
+                raise InputError("This reference has no attitude.", "Use heavytop.reference(..., attitude=True).")
             return run.matrices()
         return (_with_attitude(run) if run.problem.xi is None else run).matrices()
 
@@ -105,18 +103,18 @@ def samples(run: Any) -> Samples:
     """A motion in double; raises InputError unless it has two samples or more, all finite."""
     if not isinstance(run, Trajectory | Reference):
         raise InputError(
-            f"run must be a motion; got {quoted(run)}.", "Give what heavytop.propagate or heavytop.reference returns."
+            f"run must be a motion; got {quoted(run)}.", "Give the result of heavytop.propagate or heavytop.reference."
         )
     count = len(run.states)
     if count < _FEWEST:
         raise InputError(
-            f"A run with {count} samples has no path.",
-            "Ask for many times, such as numpy.arange(1, 1001) / 50, and without an observer.",
+            f"A path needs at least two samples; got {count}.",
+            "Give many times, such as numpy.arange(1, 1001) / 50, and no observer.",
         )
     states = run.to_numpy()
     if not np.isfinite(states).all():
         first = int(np.flatnonzero(~np.isfinite(states).all(axis=1))[0])
-        raise InputError(f"The state of sample {first} is not finite.", "Draw the part of the run before it.")
+        raise InputError(f"The state of sample {first} is not finite.", "Draw the samples before it.")
     times = np.array([float(exact(time)) for time in run.times])[:count]
     return Samples(run, times, states[:, :3], states[:, 3:6])
 
@@ -161,7 +159,7 @@ def parameters_of(run: Motion, top: HeavyTop | None) -> Parameters:
     if isinstance(run, Trajectory):
         return run.problem.parameters
     if not isinstance(top, HeavyTop):
-        raise InputError("A reference does not say of which top it is.", "Give top=.")
+        raise InputError("A reference does not contain its top.", "Give top=.")
     return Parameters(top.inertia, top.moment, top.rotor or 0)
 
 
@@ -176,7 +174,7 @@ def direction(run: Motion, of: str | None, top: HeavyTop | None) -> tuple[str, N
         raise InputError(f"of must name a vector; got {quoted(of)}.", f"Use {', '.join(OF)}.")
     moment = parameters_of(run, top).moment
     if not any(moment):
-        raise InputError("The centre of mass is at the fixed point, or has no weight.", "Use axis1, axis2 or axis3.")
+        raise InputError("The centre of mass is at the fixed point, or the weight is 0.", "Use axis1, axis2 or axis3.")
     largest = max(map(abs, moment))
     vector = np.array([float(value / largest) for value in moment])
     rotation = axes_of(run)
@@ -198,12 +196,14 @@ def path_in_space(run: Any, of: str | None, top: HeavyTop | None) -> tuple[str, 
 def compared(run: Any, known: Any) -> tuple[Problem, list[Fraction], list[list[Fraction]], list[list[Fraction]]]:
     """(problem, times, states, known states), exact, of a subset of many; raises InputError if the times differ."""
     if not isinstance(run, Trajectory):
-        raise InputError(f"run must be a computed motion; got {quoted(run)}.", "Give what heavytop.propagate returns.")
+        raise InputError(f"run must be a computed motion; got {quoted(run)}.", "Give the result of heavytop.propagate.")
     samples(run)
     samples(known)
     count = len(run.states)
     if count != len(known.states):
-        raise InputError(f"The run has {count} samples and the other {len(known.states)}.", "Give the same times.")
+        raise InputError(
+            f"Both runs must have the same times; got {count} and {len(known.states)} samples.", "Give the same times."
+        )
     indices = every(count)
     times = [exact(run.times[index]) for index in indices]
     slack = 4 * run.problem.precision.eps

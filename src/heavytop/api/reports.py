@@ -312,7 +312,7 @@ def read_history(reports: Any, metric: str, case: str, policy: PathLike | None, 
     """Make a history like :func:`history`; ``read`` is called after each report."""
     folders = ordered(reports, "reports", "Give a list of reports or of their folders, the oldest first.")
     if len(folders) < 2:
-        raise InputError("A history needs two reports or more.", "Give their folders, the oldest first.")
+        raise InputError("A history needs at least two reports.", "Give their folders, the oldest first.")
     rules = policies.Policy() if policy is None else policies.load(arguments.path(policy, "policy"))
     cases, metrics = policies.glob(arguments.text(case, "case")), policies.glob(arguments.text(metric, "metric") or "*")
     names, report = [], []

@@ -19,6 +19,7 @@ from heavytop.display import printable
 from heavytop.errors import InputError, PeerFailed
 from heavytop.extras import require_extra
 from heavytop.features.kinds import KINDS
+from heavytop.files import writable
 from heavytop.harness import BUILT_IN, checkpoint
 from heavytop.harness.checkpoint import Checkpoint, identity_of
 from heavytop.harness.plan import read, warnings
@@ -102,18 +103,13 @@ class PlannedRun:
     def _measure(self, report: Report, progress: Progress, begun: Progress) -> FinishedRun:
         """Measure, with the versions of programs in the keys."""
         fit = partial(require_fit, self.directory, self.resume)
-        try:
-            with Checkpoint(self.directory, identity_of(report), fit, self.save_every) as rows:
-                self._require_own(rows)
-                laws = run_tasks(
-                    self.tasks, KINDS, rows, progress, self.workers, self.scheduler, begun, self.row_timeout
-                )
-                return self._write(report, self._reported(rows, laws))
-        except OSError as error:
-            raise InputError(
-                f"{self.directory} cannot be written: {error}.",
-                "Make space, or choose a writable --out; finished rows are kept for --resume.",
-            ) from None
+        with (
+            writable(self.directory),
+            Checkpoint(self.directory, identity_of(report), fit, self.save_every) as rows,
+        ):
+            self._require_own(rows)
+            laws = run_tasks(self.tasks, KINDS, rows, progress, self.workers, self.scheduler, begun, self.row_timeout)
+            return self._write(report, self._reported(rows, laws))
 
     def _require_own(self, rows: Checkpoint) -> None:
         """Raise InputError if the checkpoint has a row that no run of this plan has written."""
@@ -183,11 +179,13 @@ def prepare(
     timeout = of_plan if row_timeout is None else row_timeout
     workers = arguments.count(workers, "workers")
     if workers is not None and scheduler is not None:
-        raise InputError("--workers are processes here, --scheduler has its own.", "Give one of them.")
+        raise InputError(
+            "--workers and --scheduler exclude each other: a scheduler has its own workers.", "Give one of them."
+        )
     if not save_every >= 0:
         raise InputError(f"save_every must be 0 or more; got {save_every}.", "Give seconds, such as 10.")
     if resume and out is None:
-        raise InputError("--resume needs to know what to resume.", "Give the folder with --out.")
+        raise InputError("--resume needs --out.", "Give the folder of the run that was interrupted.")
     identity = {"name": loaded.name, "sha256": digest, "seed": str(seed)}
     identity |= {} if plan in BUILT_IN else {"file": printable(Path(plan).name)}
     run = PlannedRun(
@@ -242,5 +240,5 @@ def require_fit(directory: Path, resume: bool) -> None:
     if resume and begun:
         content -= {name for name in content if is_written(name)}  # written, but the checkpoint is not yet removed
     if content:
-        remedy = "Give a new folder with --out." + (" Or go on with --resume." if begun else "")
-        raise InputError(f"{directory} already holds {', '.join(sorted(content)[:5])}.", remedy)
+        remedy = "Give a new folder with --out." + (" Or continue that run with --resume." if begun else "")
+        raise InputError(f"{directory} already contains {', '.join(sorted(content)[:5])}.", remedy)

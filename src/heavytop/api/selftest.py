@@ -135,7 +135,7 @@ def in_words(trials: Sequence[Trial]) -> RenderableType:
             Text(trial.fault, style=style), Text(trial.about), Text(trial.verdict, style=style), Text(_words(trial))
         )
     wrong = [trial.fault for trial in trials if not trial.as_expected]
-    note = f"Not as expected: {', '.join(wrong)}." if wrong else "Every fault that can be seen was seen, and no other."
+    note = f"Not as expected: {', '.join(wrong)}." if wrong else "Every detectable fault was detected, and no other."
     return Group(table, Text(), Text(note, style="bold red" if wrong else "green"))
 
 
@@ -145,6 +145,6 @@ def _words(trial: Trial) -> str:
         more = len(trial.caught_by) - _SHOWN
         return "\n".join(lines + ([f"and {more} more"] if more > 0 else []))
     if trial.shift is None or trial.shift[1] == 0:
-        return "nothing moved"
+        return "no metric changed"
     taken = "read as an improvement" if trial.verdict == "better" else "inside its allowance"
     return f"nothing: {trial.shift[0]} moved most, by {trial.shift[1]:.2f} decades, {taken}"

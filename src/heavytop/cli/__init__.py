@@ -32,7 +32,7 @@ _COMPLETE = "_HEAVYTOP_COMPLETE"
 """Set by the scripts of `heavytop --completion SHELL`."""
 
 
-_NO_MEMORY = "There is not enough memory.\n  Ask for less at once, or use a machine with more."
+_NO_MEMORY = "Not enough memory.\n  Request less at once, or use a machine with more."
 
 
 def run_command_line() -> int:

@@ -131,12 +131,6 @@ def print_json(document: Any) -> None:
     print(printable(text))
 
 
-def require_new(folder: Path) -> None:
-    """Raise InputError for a folder that is not empty."""
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(f"{folder} already holds other content.", "Give a new folder with --out.")
-
-
 def require_apart(files: Iterable[Path | None], *read: Path | None) -> None:
     """Raise InputError if an output is given twice, or is an input, or of the report in a folder that is one."""
     written = [path for path in files if path is not None]
@@ -145,7 +139,7 @@ def require_apart(files: Iterable[Path | None], *read: Path | None) -> None:
     for path in written:
         target = absolute(path).resolve()
         if target in used:
-            raise InputError(f"{path} is named twice.", "Give each file a name of its own.")
+            raise InputError(f"{path} is named twice.", "Give each file its own name.")
         used.add(target)
 
 

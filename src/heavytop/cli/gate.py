@@ -48,7 +48,7 @@ def gate(
 
     trusted, fresh, rules = absolute(baseline), absolute(out), policy_of(plan, policy)
     if fresh.resolve() == trusted.resolve():
-        raise InputError(f"{out} is named twice.", "Give the new report another folder than the baseline.")
+        raise InputError(f"{out} is named twice.", "Give different folders for the new report and the baseline.")
     code = Path(integrator.partition(":")[0]) if integrator else None
     require_apart((markdown, junit, html), baseline, out, rules, Path(plan), code)
     command_line = join(["heavytop", *sys.argv[1:], "--bless"])

@@ -74,7 +74,7 @@ def new(
         print("\n".join(engines()))
         return ExitCode.GOOD
     if folder is None and into is None:
-        raise InputError("A folder must be named.", "Give DIR, or --into a repository.")
+        raise InputError("DIR is missing.", "Give DIR, or --into a repository.")
     made = (into or Path()) / (folder or "heavytop")
     files = new_integrator(made, language, method, into, engine)
     print(fill(f"{made}: {', '.join(files)}", 80, subsequent_indent="  ", **_WHOLE_WORDS))

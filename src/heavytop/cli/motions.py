@@ -57,10 +57,10 @@ def require_one_output(files: Mapping[str, Path | None], json: bool) -> None:
     """Raise InputError if standard output or a file would get two documents."""
     on_screen = [f"--{name}" for name, path in files.items() if path == _SCREEN] + ["--json"] * json
     if len(on_screen) > 1:
-        raise InputError(f"{' and '.join(on_screen)} both print on standard output.", "Give a file for one of them.")
+        raise InputError(f"{' and '.join(on_screen)} both print to standard output.", "Give a file for one of them.")
     for a, b in combinations([name for name, path in files.items() if path not in (None, _SCREEN)], 2):
         if files[a] == files[b]:
-            raise InputError(f"{files[a]} is asked for as {_AS[a]} and as {_AS[b]}.", "Give two files.")
+            raise InputError(f"{files[a]} is requested as {_AS[a]} and as {_AS[b]}.", "Give two files.")
 
 
 _AS = {"csv": "CSV", "latex": "LaTeX", "bibtex": "BibTeX"}

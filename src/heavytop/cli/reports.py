@@ -253,7 +253,7 @@ def run(
     if planned.is_finished:
         ended = planned.finished()
         print(ended.summary)
-        print(f"\nReport: {directory / REPORT} (was finished already)")
+        print(f"\nReport: {directory / REPORT} (already finished)")
         return ExitCode.GOOD if ended.good else ExitCode.INCOMPLETE
     began = perf_counter()
     ended = measured(planned)

@@ -21,9 +21,9 @@ import msgspec
 
 from heavytop import records
 from heavytop.cases import CASES, Case, case, named_bodies, require_possible
-from heavytop.errors import InputError, invalid, meant, nearest, prefixed, quoted, why
+from heavytop.errors import InputError, invalid, meant, nearest, prefixed, quoted
 from heavytop.exact.resolved import resolve
-from heavytop.files import read_whole
+from heavytop.files import read_whole, readable
 from heavytop.harness import BUILT_IN, OF_FEATURES
 from heavytop.harness.rows import Kinds, PlanTable, Task
 from heavytop.harness.sweeps import Lazy, Sweep
@@ -140,10 +140,8 @@ def load(name: str, kinds: Kinds) -> tuple[Plan, str]:
     if name in BUILT_IN:
         text = _built_in(name).read_text("utf-8")
     elif Path(name).suffix == ".toml":
-        try:
+        with readable(f"The plan {name}", _READABLE):
             text = read_whole(Path(name)).decode("utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise InputError(f"The plan {name} cannot be read: {why(error)}.", _READABLE) from None
     else:
         remedy = meant(name, BUILT_IN) + "`heavytop list` shows the plans; your own is a file ending in .toml."
         raise InputError(f"Unknown plan {name[:60]!r}.", remedy)

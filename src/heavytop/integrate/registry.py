@@ -33,9 +33,9 @@ from heavytop.errors import (
     invalid,
     meant,
     quoted,
-    why,
 )
 from heavytop.extras import extra_of, missing
+from heavytop.files import readable
 from heavytop.integrate.peers.command import Command
 from heavytop.integrate.peers.contract import CheckedPlugin, Declared, contained, quiet, require_equal, said
 from heavytop.integrate.peers.source import PythonFile, PythonObject, place_of
@@ -399,10 +399,8 @@ def of_callable(call: Any) -> IntegratorSource:
 def commands_in(path: Path) -> list[Command]:
     """The programs that a TOML file describes; raises InputError for anything else in it."""
     try:
-        text = path.read_text("utf-8")
-        document = tomllib.loads(text)
-    except (OSError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"{path} cannot be read: {why(error)}.", "Give a readable TOML file.") from None
+        with readable(path, "Give a readable TOML file.", RecursionError):
+            document = tomllib.loads(path.read_text("utf-8"))
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path} is not valid: {error}.", _SHOWN) from None
     tables = document.get("integrator")

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from heavytop.errors import InputError, prefixed, quoted
-from heavytop.files import read_whole
+from heavytop.files import read_whole, readable
 from heavytop.precision import Vector, cross, exact, round_to, six_digits, vector
 from heavytop.top import inertia_slips
 from heavytop.top.attitude import Attitude, multiplied, rotated, transposed
@@ -111,10 +111,8 @@ Link = tuple[str, Callable[[], BodyInFile]]
 
 
 def _links(path: Path) -> Iterator[Link]:
-    try:
+    with readable(path, "Give an existing file."):
         content = read_whole(path)
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}.", "Give a file that is there.") from None
     if len(content) > _LARGEST_FILE:
         raise InputError(f"{path} has {len(content)} bytes.", f"A body is read from at most {_LARGEST_FILE}.")
     if content.startswith(_BINARY_USD) or (content.startswith(b"#usda") and _COMPOSED.search(content)):

@@ -279,18 +279,18 @@ def test_scales_times_and_digits_far_from_one() -> None:
             "value 2 (component 1, t = 2): quantity must be one of this motion; got 'power'",
         ),
         ({"values": [one("gamma", 3, "1"), one("quaternion", 2, "1", "1/2")]}, "value 2 (component 2, t = 1/2): gamma"),
-        ({"values": [one("omega", 1, "1"), one("omega", 2, 1)]}, "value 2: number has to be text"),  # type: ignore[arg-type]
+        ({"values": [one("omega", 1, "1"), one("omega", 2, 1)]}, "value 2: number must be text"),  # type: ignore[arg-type]
         ({"values": [one("omega", 1, "1"), {"time": "0", "number": "1"}]}, "value 2 lacks the key quantity"),
         ({"values": [one("omega", 4, "1")]}, "no component 4"),
         ({"values": [one("energy", 2, "1")]}, "no component 2"),
         ({"values": [{"quantity": "gamma", "number": "1", "time": "0"}]}, "gamma of a component that is not named"),
-        ({"top": TOP | {"rotor": ["1", "0"]}}, "top.rotor has to be a list of length >= 3"),
+        ({"top": TOP | {"rotor": ["1", "0"]}}, "top.rotor must be a list of length >= 3"),
         ({"values": [one("omega", 0, "1")]}, ">= 1"),
         ({"values": [one("omega", 1, "1"), one("omega", 1, "2", "0.0")]}, "stands in value 1 already"),
         ({"values": [one("omega", 1, "1", tolerance="-1")]}, "negative"),
         ({"values": [one("omega", 1, "1", tolerance="nan")]}, "tolerance"),
         ({"values": [one("omega", 1, "1", "inf")]}, "time"),
-        ({"values": [one("omega", 1, 0.5)]}, "has to be text, and is a number"),  # type: ignore[arg-type]
+        ({"values": [one("omega", 1, 0.5)]}, "must be text; got a number"),  # type: ignore[arg-type]
         ({"values": [one("omega", 1, "1") | {"unit": "m"}]}, "unit"),
         ({"body": TENSOR_BODY}, "one of"),
         ({"top": None}, "one of"),

@@ -7,9 +7,10 @@ from typing import Annotated, Any
 
 import typer
 
-from heavytop.cli.app import Json, absolute, command, print_json, require_new, show_on_terminal
+from heavytop.cli.app import Json, absolute, command, print_json, show_on_terminal
 from heavytop.cli.output import counted, followed, waiting
 from heavytop.errors import ExitCode, InputError
+from heavytop.files import require_new, writable
 
 _AUDIT_SECONDS, _FIGURE_SECONDS, _ENTRY_SECONDS = 6.0, 1.0, 1.0
 """Expected durations of an audit, of each figure, and of each entry of the library."""
@@ -110,11 +111,9 @@ def figures(
     """
     out = absolute(out)
     require_new(out)
-    try:
+    with writable(out):
         for file in _drawn(out, report):
             print(file)
-    except OSError as error:
-        raise InputError(f"{out} cannot be written: {error}.", "Choose a writable --out with space.") from None
     return ExitCode.GOOD
 
 

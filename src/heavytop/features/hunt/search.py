@@ -601,10 +601,7 @@ def keep(path: Path, motions: Sequence[Motion]) -> None:
     if len(every) == len(known):
         return
     tables = [forms(case_of(motion, i))["toml"] for i, motion in enumerate(every, 1)]
-    try:
-        replace(path, ("\n\n".join(tables) + "\n").encode())
-    except OSError as error:
-        raise InputError(f"{path} cannot be written: {error.strerror}.", "Give a file that can be.") from None
+    replace(path, ("\n\n".join(tables) + "\n").encode())
 
 
 def _without_mass(motion: Motion) -> Motion:

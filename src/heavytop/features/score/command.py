@@ -14,12 +14,12 @@ from heavytop.cli.app import (
     command,
     print_json,
     require_apart,
-    require_new,
     show_on_terminal,
     writing,
 )
 from heavytop.cli.output import counted, say
 from heavytop.errors import InputError
+from heavytop.files import require_new, writable
 
 if TYPE_CHECKING:
     from heavytop.records import Report
@@ -112,8 +112,6 @@ def _write_report(report: Report, out: Path) -> None:
     """The report that `compare` and `show` read."""
     from heavytop.report.store import store
 
-    try:
+    with writable(out):
         out.mkdir(parents=True, exist_ok=True)
         store.write(report, out)
-    except OSError as error:
-        raise InputError(f"{out} cannot be written: {error}.", "Choose a writable --out with space.") from None

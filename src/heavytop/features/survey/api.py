@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from heavytop import arguments
-from heavytop.errors import InputError, quoted, why
+from heavytop.errors import InputError, quoted
 from heavytop.extras import require_extra
 from heavytop.features.survey.gathered import COLUMNS, FILE
+from heavytop.files import readable
 from heavytop.precision import ordered
 
 
@@ -53,7 +54,5 @@ def read_survey(path: str | os.PathLike[str], *, columns: Sequence[str] | None =
     require_extra("parquet")
     import pyarrow
 
-    try:
+    with readable(file, "Give the folder of a finished run.", pyarrow.ArrowException):
         return pandas.read_parquet(file, columns=wanted, engine="pyarrow")
-    except (OSError, pyarrow.ArrowException) as error:
-        raise InputError(f"{file} cannot be read: {why(error)}.", "Give the folder of a finished run.") from None

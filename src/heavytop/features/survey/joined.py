@@ -16,9 +16,9 @@ from typing import Any
 import numpy
 
 from heavytop.cases import Case
-from heavytop.errors import InputError, why
 from heavytop.extras import require_extra
 from heavytop.features.survey.gathered import DATA
+from heavytop.files import readable
 from heavytop.harness.case_text import rerun
 from heavytop.harness.plan import uniform
 from heavytop.integrate.trajectory import Outcome
@@ -68,10 +68,8 @@ def _records(file: Path, row: Row) -> dict[str, Any]:
     subject, key = row.key.subject, row.key
     same = dict(zip(_SAME, (key.case, subject.name, subject.tolerance, key.precision, key.horizon), strict=True))
     columns = ["index", "outcome", "error_max", "digits_right", *DATA]
-    try:
+    with readable(file, "Give the folder of a finished run.", pyarrow.ArrowException):
         table = read_table(file, columns=columns, filters=[(name, "=", text) for name, text in same.items()])
-    except (OSError, pyarrow.ArrowException) as error:
-        raise InputError(f"{file} cannot be read: {why(error)}.", "Give the folder of a finished run.") from None
     records = {name: table[name].to_numpy() for name in columns if name != "outcome"}
     return records | {"outcome": table["outcome"].cast("string").to_numpy()}
 

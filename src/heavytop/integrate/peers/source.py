@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from heavytop.errors import InputError, NoSuchFunction, PeerFailed, meant
+from heavytop.files import readable
 from heavytop.integrate.peers.contract import contained, quiet, said
 
 _FORMS = "A peer takes (top, start, times, precision, *, system, tolerance), a solver takes what is given alone."
@@ -36,10 +37,8 @@ class PythonFile:
     def load(self) -> Callable[..., Any]:
         """The peer; the file is run again if it has changed."""
         path = Path(self.path)
-        try:
+        with readable(path, "Give FILE.py:FUNCTION."):
             status = path.stat()
-        except OSError as error:
-            raise InputError(f"{self.path} cannot be read: {error.strerror}.", "Give FILE.py:FUNCTION.") from None
         module: Any = _module(path, (status.st_mtime_ns, status.st_size))
         try:
             call = attrgetter(self.function)(module)

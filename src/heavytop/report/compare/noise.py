@@ -21,8 +21,8 @@ from typing import Literal
 
 import msgspec
 
-from heavytop.errors import InputError, invalid, why
-from heavytop.files import read_whole
+from heavytop.errors import InputError, invalid
+from heavytop.files import read_whole, readable
 from heavytop.measure.scorer import SOLUTION_ERROR
 from heavytop.precision import exact, log10, physical
 from heavytop.records import Metric, Quantity, Row
@@ -156,10 +156,10 @@ class Lookup:
 
 def load(path: Path) -> Policy:
     """The policy in a TOML file; raises InputError for a key that is unknown, a negative number, an empty pattern."""
+    with readable(f"The policy {str(path)[:200]}", "Give a TOML file."):
+        text = read_whole(path).decode("utf-8")
     try:
-        return msgspec.convert(tomllib.loads(read_whole(path).decode("utf-8")), Policy)
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"The policy {str(path)[:200]} cannot be read: {why(error)}.", "Give a TOML file.") from None
+        return msgspec.convert(tomllib.loads(text), Policy)
     except InputError as error:
         raise InputError(f"The policy {path} is not valid: {error.cause}", error.remedy) from None
     except (tomllib.TOMLDecodeError, msgspec.ValidationError, RecursionError) as error:

@@ -28,6 +28,7 @@ from heavytop.features.claims.audit.stability import UserStability
 from heavytop.features.claims.audit.user_claims import FileClaim, UserIntegral, UserMotion
 from heavytop.features.claims.audit.values import ValueClaim, ValueFile
 from heavytop.features.claims.library.entry import FOLDER, Entry, Verdict, file_of, library, split
+from heavytop.files import readable
 from heavytop.guard import processors
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System, system
 
@@ -55,14 +56,9 @@ _REMEDY = "`heavytop docs claims-in-toml` has the format, with examples."
 
 def read_claim(path: Path) -> FileClaim | ValueClaim:
     """The claim in a TOML file; raises InputError for a file that holds no valid claim."""
-    try:
-        with path.open("rb") as stream:
-            raw = stream.read(_MAX_BYTES + 1)
-    except OSError as error:
-        raise InputError(
-            f"{path} cannot be read: {error.strerror}.",
-            "Give a TOML file that is there, or an id that `heavytop claims` lists.",
-        ) from None
+    remedy = "Give an existing TOML file, or an id that `heavytop claims` lists."
+    with readable(path, remedy), path.open("rb") as stream:
+        raw = stream.read(_MAX_BYTES + 1)
     if len(raw) > _MAX_BYTES:
         raise InputError(f"{path} is longer than {_MAX_BYTES} bytes.", "A claim is a page of formulas.")
     try:

@@ -16,7 +16,7 @@ from typing import Any
 from heavytop import written_numbers
 from heavytop.arguments import MOST_STATES
 from heavytop.cases import Case
-from heavytop.errors import InputError, meant, nearest, quoted, why
+from heavytop.errors import InputError, meant, nearest, quoted
 from heavytop.features.score.trajectories import bags, logs
 from heavytop.features.score.trajectories import columns as observed_columns
 from heavytop.features.score.trajectories.observed import (
@@ -32,7 +32,7 @@ from heavytop.features.score.trajectories.observed import (
     rounded_state,
     too_many,
 )
-from heavytop.files import read_whole, without_repeats
+from heavytop.files import read_whole, readable, without_repeats
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.attitude_error import WIDTHS
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, Vector, decimal_text, exact_text, parse, real, shown
@@ -366,13 +366,11 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
     piped = str(path) == "-"
     if not piped and path.exists() and not path.is_dir() and path.suffix.lower() not in _SUFFIXES:
         raise InputError(f"{shown_path} has none of the endings {', '.join(_SUFFIXES)}.", REMEDY)
-    try:
+    with readable(f"The trajectory {shown_path}", REMEDY):
         content = sys.stdin.buffer.read() if piped else read_whole(path)
         text = _text_of(path, content)
-        if logs.is_ephemeris(text):
-            text = logs.of_ephemeris(text)
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"The trajectory {shown_path} cannot be read: {why(error)}.", REMEDY) from None
+    if logs.is_ephemeris(text):
+        text = logs.of_ephemeris(text)
     if re.match(r'\s*\{\s*"schema"\s*:\s*"heavytop-report', text):
         raise InputError(
             f"{shown_path} is a report of heavytop, not a trajectory.", f"`heavytop show {shown_path}` shows it."
