@@ -79,7 +79,7 @@ def test_a_run_that_stops_early_is_incomplete_and_keeps_what_it_reached() -> Non
         ({"inertia": "3,2"}, [], "--inertia has 2 numbers"),
         ({"omega": "1,x,2"}, [], "--omega: 'x' is not a finite number"),
         ({"gamma": "1,1,0"}, [], "--normalize"),
-        ({"gamma": "0,0,0"}, ["--normalize"], "zero vector"),
+        ({"gamma": "0,0,0"}, ["--normalize"], "must not be zero"),
         ({}, ["--system", "gyrostat"], "centre of mass on axis 2"),
         ({"centre": "0,1,0"}, ["--system", "gyrostat"], "parallel to M"),
         ({"centre": "0,1,0", "omega": "0,1,0"}, ["--system", "gyrostat"], "M·gamma != 0"),
@@ -92,7 +92,7 @@ def test_a_run_that_stops_early_is_incomplete_and_keeps_what_it_reached() -> Non
         ({}, ["--colour", "red"], "--colour"),
         ({"omega": "1e400,0,0"}, [], "too large"),
         ({"times": "1e5000,1e5000"}, [], "too large"),
-        ({"inertia": "-1e5000,1,1"}, [], "not positive"),
+        ({"inertia": "-1e5000,1,1"}, [], "must be positive"),
     ],
 )
 def test_bad_input_gets_a_clear_error_and_exit_2(changes, more, message) -> None:

@@ -200,8 +200,8 @@ def test_gimbal_lock_is_said_in_words() -> None:
     [
         (["--show", "quaternions"], "Unknown output 'quaternions'"),
         (["--show", ""], "names no output"),
-        (["--show", "matrix,matrix"], "stands twice"),
-        (["--show", "euler:ZXZ,euler:ZYX"], "stands twice"),
+        (["--show", "matrix,matrix"], "given twice"),
+        (["--show", "euler:ZXZ,euler:ZYX"], "given twice"),
         (["--show", "matrix", "--point", "1,2,3"], "no position is asked for"),
         (["--pivot", "1,2,3"], "no position is asked for"),
         (["--show", "position", "--pivot", "1,2,1e400"], "too large"),
@@ -266,4 +266,4 @@ def test_axis_and_angle_are_an_attitude_of_both_commands(command: str) -> None:
     assert (found["states"], found["matrix"]) == (beside["states"], beside["matrix"])
     right = turned("--axis-angle", "0,1,0:90deg")
     assert right["states"] == turned("--matrix", "0,0,1,0,1,0,-1,0,0")["states"]
-    assert "not an axis and an angle" in str(refused(command, "--axis-angle", "0,0,3", data=without))
+    assert "must be an axis and an angle" in str(refused(command, "--axis-angle", "0,0,3", data=without))

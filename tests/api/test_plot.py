@@ -169,8 +169,8 @@ def test_what_has_no_picture_is_refused(run, known) -> None:
     seen: list[object] = []
     observed = ht.propagate(LAGRANGE, START, TIMES, observer=lambda time, state: seen.append(time))
     for bad, match in (
-        (single, "1 samples"),
-        (observed, "0 samples"),
+        (single, "at least two samples; got 1"),
+        (observed, "at least two samples; got 0"),
         (3, "must be a motion"),
         (None, "must be a motion"),
     ):

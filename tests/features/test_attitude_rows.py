@@ -98,10 +98,10 @@ def test_the_band_of_a_body_with_a_rotor_is_rounding_noise(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('about = "pivot"\n', "", "which point"),
+        ('about = "pivot"\n', "", "reference point of the inertia tensor"),
         ('mass = "2"\n', 'mass = "2"\nweight = "3"\n', "weight and mass"),
         ("ZYX:", "ZYY:", "ZYY"),
-        ('omega = ["1", "2", "-3"]', 'gamma = ["0", "0", "1"]', "neither omega"),
+        ('omega = ["1", "2", "-3"]', 'gamma = ["0", "0", "1"]', "got neither"),
         ('gravity = "9.81"\n', "", "gravity is missing"),
     ],
 )

@@ -225,7 +225,7 @@ def test_outputs_are_right_from_any_thread(known: Reference) -> None:
     ("name", "options", "message"),
     [
         ("quaternions", {}, "Unknown output"),
-        ("euler", {}, "need their sequence"),
+        ("euler", {}, "need a sequence"),
         ("euler:ABC", {}, "Unknown sequence"),
         ("matrix:ZXZ", {}, "Unknown output"),
         ("", {}, "Unknown output"),

@@ -20,7 +20,7 @@ def test_numbers_of_every_kind_are_taken_exactly() -> None:
 
 @pytest.mark.parametrize("inertia", [(1, 0, 2), (1, 2, -3), ("1", "2", "-1/9")])
 def test_moments_that_are_not_positive_are_refused(inertia) -> None:
-    with pytest.raises(InputError, match=r"I\d = .* is not positive"):
+    with pytest.raises(InputError, match=r"I\d must be positive; got"):
         HeavyTop(inertia, 1, (0, 0, 1))
 
 
@@ -62,7 +62,7 @@ def test_normalized_gamma_is_exactly_of_unit_length_and_within_1e_30() -> None:
             assert along > 0
             assert square - along**2 <= square * Fraction(1, 10**60)
     assert State((0, 0, 0), (0, 0, -5)).normalized().gamma == (0, 0, -1)
-    with pytest.raises(InputError, match="zero vector"):
+    with pytest.raises(InputError, match="must not be zero"):
         State((0, 0, 0), (0, 0, 0)).normalized()
 
 
@@ -93,6 +93,6 @@ def test_numbers_beyond_every_float_are_refused_and_shown_short() -> None:
             require_physical(top, state)
         assert len(str(error.value)) < 200
     assert all(len(warning) < 200 for warning in HeavyTop(("1e5000", 1, 1), 1, (0, 0, 1)).warnings())
-    with pytest.raises(InputError, match="not positive") as error:
+    with pytest.raises(InputError, match="must be positive") as error:
         HeavyTop(("-1e5000", 1, 1), 1, (0, 0, 1))
     assert len(str(error.value)) < 200

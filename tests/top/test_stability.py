@@ -126,7 +126,7 @@ def test_about_an_axis_between_two_equal_moments_omega_drifts_away(rotor: Fracti
     top = ht.HeavyTop(renamed(2, 2, 1), 0, (0, 0, 0), renamed(0, 0, rotor) if rotor else None)
     steady_motion = of(top, ht.State(renamed(3, 4, rotor), (0, 0, 1)), system)
     assert (steady_motion.verdict, steady_motion.rate, steady_motion.drift) == ("unstable", 0, 0.5)
-    assert "turns it away linearly, by 0.5 ε t" in steady_motion.text()
+    assert "drift away linearly, by 0.5 ε t" in steady_motion.text()
     beside = ht.reference(top, ht.State(renamed(3, 4, rotor + off), (0, 0, 1)), [time], digits=12, system=system)
     omega = [float(beside.states[0][axes.index(k)].value) for k in range(2)]
     turned = complex(*omega) / complex(3, 4)

@@ -92,9 +92,9 @@ def test_doubles_are_a_copy_and_backwards_they_go_as_well() -> None:
     ("times", "message"),
     [
         ([], "No times"),
-        ([1.0, 0.5], "does not come after"),
-        ([1, 1 + TINY, 1], "does not come after"),  # what doubles do not tell apart
-        ([1 + TINY, 1], "does not come after"),
+        ([1.0, 0.5], "must move strictly away from 0"),
+        ([1, 1 + TINY, 1], "must move strictly away from 0"),  # what doubles do not tell apart
+        ([1 + TINY, 1], "must move strictly away from 0"),
         ([-1.0, 1.0], "different signs"),
         ([-Fraction(1, 10**400), 1], "different signs"),
         ([0.0, 0.0], "more than once"),

@@ -114,9 +114,7 @@ def initial_xi(gamma: Vector) -> list[arb]:
     """The default ξ at t = 0: :func:`perpendicular` of γ/|γ|; raises InputError for γ = 0."""
     square = dot(gamma, gamma)
     if square == 0:
-        raise InputError(
-            "gamma is the zero vector: no attitude stands on it.", "Give the direction that points vertically up."
-        )
+        raise InputError("gamma must not be zero.", "Give the direction that points vertically up.")
     root = rational_root(square)
     if root is not None:
         return [ball(x) for x in perpendicular((gamma[0] / root, gamma[1] / root, gamma[2] / root))]

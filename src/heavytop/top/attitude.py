@@ -253,7 +253,7 @@ class Attitude:
         if square == 0:
             raise InputError("A quaternion must not be zero.", "Give w,x,y,z of length 1.")
         if square != 1 and not normalize:
-            raise InputError(f"The quaternion is not of length 1: |q|^2 - 1 = {_size(square - 1)}.", _NORMALIZE)
+            raise InputError(f"A quaternion must have length 1; |q|^2 - 1 = {_size(square - 1)}.", _NORMALIZE)
         return cls("quaternion", q)
 
     @classmethod
@@ -289,14 +289,17 @@ class Attitude:
         """The rotation by ``angle`` (radians, or "30deg") about ``axis``, of any length; raises InputError for 0."""
         direction = vector(axis, "axis")
         if not any(direction):
-            raise InputError("The axis is the zero vector, which has no direction.", "Give the axis of the rotation.")
+            raise InputError("The axis of a rotation must not be zero.", "Give its direction.")
         return cls("axis_angle", direction, (Angle.read(angle),))
 
     @classmethod
     def rotation(cls, rotation: Rotation) -> Attitude:
         """From one ``scipy.spatial.transform.Rotation``, body to space; raises InputError for several."""
         if not getattr(rotation, "single", False):
-            raise InputError(f"{quoted(rotation)} is not a single Rotation.", "Give one of scipy.spatial.transform.")
+            raise InputError(
+                f"rotation must be a single Rotation; got {quoted(rotation)}.",
+                "Give a Rotation of scipy.spatial.transform.",
+            )
         x, y, z, w = rotation.as_quat().tolist()
         return cls.quaternion(w, x, y, z, normalize=True)
 
@@ -394,7 +397,7 @@ def _square(rows: Iterable[Any]) -> Three[Vector]:
     if len(square) == 9:
         square = [square[:3], square[3:6], square[6:]]
     if len(square) != 3:
-        raise InputError(f"matrix has {len(square)} entries.", remedy)
+        raise InputError(f"matrix must have 9 entries; got {len(square)}.", remedy)
     first, second, third = (vector(row, "a row of the matrix") for row in square)
     return first, second, third
 
@@ -586,10 +589,10 @@ def output(text: str | Output, point: Iterable[Any] | None = None, pivot: Iterab
         raise InputError(f"Unknown output {quoted(text)}.", _REMEDY)
     if name == "euler":
         if not sequence:
-            raise InputError("Euler angles need their sequence.", "Give it as in euler:ZXZ.")
+            raise InputError("Euler angles need a sequence.", "Give one, as in euler:ZXZ.")
         sequence = require_sequence(sequence.strip())
     if name != "position" and (point is not None or pivot is not None):
-        raise InputError(f"{name} has no point and no pivot.", "Ask for position, or leave them out.")
+        raise InputError(f"{name} has no point and no pivot.", "Add position to the outputs, or leave them out.")
     vector_of_point = None if point is None else _place(point, "point")
     return Output(name, sequence, vector_of_point, _ORIGIN if pivot is None else _place(pivot, "pivot"))
 
@@ -610,10 +613,10 @@ def outputs(text: str, point: Iterable[Any] | None = None, pivot: Iterable[Any] 
     for name in names:
         if names.count(name) > 1:
             raise InputError(
-                f"The output {quoted(name)} stands twice.", "Give each once; Euler angles of one sequence."
+                f"The output {quoted(name)} is given twice.", "Give each once; Euler angles of one sequence."
             )
     if "position" not in names and (point is not None or pivot is not None):
-        raise InputError("A point or a pivot is given, but no position is asked for.", "Add position to the outputs.")
+        raise InputError("A point or a pivot was given, but no position was requested.", "Add position to the outputs.")
     if not parts:
         raise InputError(f"{quoted(text)} names no output.", _REMEDY)
     return tuple(

@@ -112,7 +112,7 @@ def _spread(tensor: Rows[Fraction]) -> int:
     if spread > _MOST_SPREAD:
         raise InputError(
             "Two principal moments of the inertia tensor differ by a factor above 1e300.",
-            "Check its entries and their units: no body that can be computed has such moments.",
+            "Check its entries and their units.",
         )
     return spread // _GUARD_BITS * _GUARD_BITS
 
@@ -261,7 +261,7 @@ class Body:
     ) -> None:
         data = {"mass": _number(mass, "mass"), "gravity": magnitude_of_gravity(gravity)}
         if data["mass"] <= 0:
-            raise InputError(f"mass = {shown(data['mass'])} is not positive.", "Give the mass of the body.")
+            raise InputError(f"mass must be positive; got {shown(data['mass'])}.", "Give the mass of the body.")
         centre_vector = vector(centre, "centre")
         inertia_tensor = _tensor(inertia)
         to_pivot = _about(about, centre_vector) == CENTRE
@@ -378,8 +378,8 @@ def magnitude_of_gravity(value: Given) -> Fraction:
     magnitude = _number(value, "gravity")
     if magnitude < 0:
         raise InputError(
-            f"gravity = {shown(magnitude)} is negative.",
-            "Give its size, such as 9.81: gravity points down; e_z, or the axis named by up, points up.",
+            f"gravity must not be negative; got {shown(magnitude)}.",
+            "Give its magnitude, such as 9.81. Gravity points down: along -e_z, or against the axis that up names.",
         )
     return magnitude
 
@@ -394,12 +394,12 @@ def _about(about: object, centre: Vector) -> str:
     if about is None:
         if any(centre):
             raise InputError(
-                "It is not said which point the inertia tensor is about.",
+                "The reference point of the inertia tensor (about) is missing.",
                 f'Give about = "{PIVOT}" or "{CENTRE}": with the centre of mass off the pivot they differ.',
             )
         return PIVOT
     if not isinstance(about, str) or about not in (PIVOT, CENTRE):
-        raise InputError(f"about = {quoted(about)} is unknown.", f'Use "{PIVOT}" or "{CENTRE}".')
+        raise InputError(f'about must be "{PIVOT}" or "{CENTRE}"; got {quoted(about)}.', "Give one of these.")
     return about
 
 
@@ -409,7 +409,7 @@ def _tensor(inertia: Iterable[Any]) -> Tensor:
     if len(values) == 3 and all(isinstance(value, Iterable) and not isinstance(value, str) for value in values):
         values = [part for row in values for part in vector(row, "a row of the inertia tensor")]
     if len(values) not in (3, 6, 9):
-        raise InputError(f"inertia has {len(values)} numbers.", _SHAPES)
+        raise InputError(f"inertia must have 3, 6 or 9 numbers; got {len(values)}.", _SHAPES)
     n = [_number(value, "inertia") for value in values]
     return rows(six_of_nine(n) if len(n) == 9 else [*n, *[Fraction(0)] * (6 - len(n))])
 
@@ -477,13 +477,15 @@ def body_of(data: Mapping[str, Any]) -> Body:
     twice = [key for key in BODY if key in data and key != "gravity"]
     if twice:
         given = argument(twice[0])
-        raise InputError(f"{argument('file')} and {given} were given.", f"The file says {twice[0]}: leave {given} out.")
+        raise InputError(
+            f"{argument('file')} and {given} were given.", f"The file defines {twice[0]}: leave {given} out."
+        )
     return Body.from_file(data["file"], data.get("link"), gravity=data.get("gravity"))
 
 
 def _require(data: Mapping[str, Any], key: str) -> Any:
     if key not in data:
-        raise InputError(f"{argument(key)} is missing.", "Give it, or the name of a case that has it.")
+        raise InputError(f"{argument(key)} is missing.", "Give it, or the name of a case that defines it.")
     return data[key]
 
 
@@ -498,7 +500,7 @@ def _body(data: Mapping[str, Any]) -> HeavyTop | Body:
             )
         if len(data["inertia"]) in (6, 9):
             raise InputError(
-                f"{argument('inertia')} has {len(data['inertia'])} numbers, and a weight stands beside it.",
+                f"{argument('inertia')} has {len(data['inertia'])} numbers, and a weight was given.",
                 "A tensor in any axes needs mass and gravity in place of weight; with weight give 3 principal moments.",
             )
         return HeavyTop(data["inertia"], data["weight"], data["centre"], rotor)
@@ -527,15 +529,17 @@ def _attitude(kind: str, value: Any, normalize: bool) -> Attitude:
         return Attitude.matrix(value, normalize=normalize)
     if kind == "quaternion":
         if len(value) != 4:
-            raise InputError(f"quaternion has {len(value)} numbers.", "Give four, the scalar first: w,x,y,z.")
+            raise InputError(f"quaternion must have 4 numbers; got {len(value)}.", "Give w,x,y,z, the scalar first.")
         return Attitude.quaternion(*value, normalize=normalize)
     if kind == "axis_angle":
         axis, colon, angle = value.partition(":") if isinstance(value, str) else ("", "", "")
         if not colon:
-            raise InputError(f"axis_angle = {quoted(value)} is not an axis and an angle.", "Give it as x,y,z:angle.")
+            raise InputError(f"axis_angle must be an axis and an angle; got {quoted(value)}.", "Give x,y,z:angle.")
         return Attitude.axis_angle(axis.split(","), angle)
     sequence, colon, angles = value.partition(":") if isinstance(value, str) else ("", "", "")
     parts = angles.split(",")
     if not colon or len(parts) != 3:
-        raise InputError(f"euler = {quoted(value)} is not a sequence and three angles.", "Give it as ZXZ:a,b,c.")
+        raise InputError(
+            f"euler must be a sequence and three angles; got {quoted(value)}.", "Give ZXZ:a,b,c or another sequence."
+        )
     return Attitude.euler(sequence.strip(), *parts)

@@ -94,7 +94,7 @@ def read_body(path: Path, link: str | None = None) -> BodyInFile:
         raise InputError(f"{path} holds no mass properties.", "A body needs its mass and its inertia tensor.")
     if len(chosen) > 1:
         remedy = f'Choose one: --link NAME, or link="{links[0][0]}" in Python.'
-        remedy = remedy if link is None else "Give each of them another name."
+        remedy = remedy if link is None else "Give each a different name."
         raise InputError(f"{path} holds {len(chosen)} bodies: {names}.", remedy)
     body = chosen[0][1]()
     if body.mass <= 0:
@@ -114,7 +114,7 @@ def _links(path: Path) -> Iterator[Link]:
     with readable(path, "Give an existing file."):
         content = read_whole(path)
     if len(content) > _LARGEST_FILE:
-        raise InputError(f"{path} has {len(content)} bytes.", f"A body is read from at most {_LARGEST_FILE}.")
+        raise InputError(f"{path} has {len(content)} bytes.", f"Give a file of at most {_LARGEST_FILE} bytes.")
     if content.startswith(_BINARY_USD) or (content.startswith(b"#usda") and _COMPOSED.search(content)):
         return composed_usd(path)
     if content.startswith((b"\xff\xfe", b"\xfe\xff")) or content.removeprefix(_UTF8_MARK).lstrip().startswith(b"<"):
@@ -127,7 +127,7 @@ def _links(path: Path) -> Iterator[Link]:
         return _usd(text)
     if path.suffix.lower() == ".toml":
         return _toml(path, text)
-    raise InputError(f"{path} is in no format that is known.", _FORMATS)
+    raise InputError(f"The format of {path} is not known.", _FORMATS)
 
 
 def _xml(path: Path, content: bytes) -> Iterator[Link]:
@@ -147,7 +147,7 @@ def _xml(path: Path, content: bytes) -> Iterator[Link]:
     if root.tag in ("mujoco", "mujocoinclude"):
         return _mjcf(path, root)
     if root.tag not in ("robot", "sdf"):
-        raise InputError(f"{path} is XML with the root <{root.tag}>.", _FORMATS)
+        raise InputError(f"The root element of {path} is <{root.tag}>.", _FORMATS)
     return _of_links(root, _urdf if root.tag == "robot" else _sdf)
 
 
@@ -217,7 +217,7 @@ class _Numbers:
         """So many numbers."""
         values = self.read(text, what, default)
         if len(values) != count:
-            raise InputError(f"{self.where}: {what} has {len(values)} numbers.", f"Give {count}.")
+            raise InputError(f"{self.where}: {what} must have {count} numbers; got {len(values)}.", f"Give {count}.")
         return values
 
     def require_known(self, names: Iterable[str], element: Element, known: Sequence[str], what: str) -> None:
@@ -300,7 +300,7 @@ def _origin(numbers: _Numbers, element: Element) -> Pose:
     if quaternion is None:
         return _rpy(numbers, pose.get("rpy")), centre
     if "rpy" in pose:
-        raise InputError(f"{numbers.where}: origin has rpy and quat_xyzw.", "Give one of them.")
+        raise InputError(f"{numbers.where}: origin has both rpy and quat_xyzw.", "Give one of them.")
     x, y, z, w = numbers.some(quaternion, "quat_xyzw", 4)
     return _turn(w, x, y, z), centre
 
@@ -362,9 +362,7 @@ _SDF_INERTIAL = ("mass", "pose", "inertia", "density", "auto_inertia_params")
 def _sdf(name: str, link: Element, inertial: Element, around: _Around) -> BodyInFile:
     numbers, pose, tensor = _Numbers(f"link {name}"), inertial.find("pose"), inertial.find("inertia")
     if inertial.find("fluid_added_mass") is not None:
-        raise InputError(
-            f"{numbers.where}: fluid_added_mass is not a body's.", "Leave it out: a heavy top has no fluid."
-        )
+        raise InputError(f"{numbers.where}: fluid_added_mass is not supported.", "Leave it out.")
     numbers.require_known([part.tag for part in inertial], inertial, _SDF_INERTIAL, "element")
     if numbers.flag(numbers.attributes(inertial, "auto").get("auto"), "auto"):
         raise InputError(
@@ -372,7 +370,10 @@ def _sdf(name: str, link: Element, inertial: Element, around: _Around) -> BodyIn
             "Write the numbers out: gz sdf --print FILE --expand-auto-inertials > FILE.sdf.",
         )
     if pose is not None and (frame := pose.get("relative_to") or pose.get("frame")):
-        raise InputError(f"{numbers.where}: relative_to {quoted(frame)} of an inertial.", "Give its pose in the link.")
+        raise InputError(
+            f"{numbers.where}: relative_to {quoted(frame)} of an inertial is not supported.",
+            "Give its pose in the link.",
+        )
     axes, centre = _pose(numbers, pose)
     if tensor is not None:
         numbers.require_known([part.tag for part in tensor], tensor, _SIX_URDF, "element")
@@ -406,7 +407,10 @@ class _SdfFrames:
         if element is self.around[self.link]:
             return _IDENTITY, _ZERO
         if element in passed:
-            raise InputError(f"{self.numbers.where}: its frames form a circle.", "Lead them back to the model.")
+            raise InputError(
+                f"{self.numbers.where}: its frames are defined in a circle.",
+                "Define each relative to the model or to an earlier frame.",
+            )
         pose, name = element.find("pose"), _base(element)
         if pose is not None:
             name = pose.get("relative_to") or pose.get("frame") or name
@@ -425,11 +429,14 @@ class _SdfFrames:
         for joint in [part for part in self.around if (part.tag, part.get("type")) == ("joint", "ball")]:
             child = _base(joint)
             if child.endswith(f"::{self.link.get('name')}"):
-                raise InputError(f"{self.numbers.where}: its ball joint is of another model.", "Put it into its own.")
+                raise InputError(
+                    f"{self.numbers.where}: its ball joint belongs to another model.",
+                    "Define the joint in the model of its link.",
+                )
             if self.around[joint] is model and "::" not in child and self.held(child) is self.link:
                 places.append(self.in_link(joint)[1])
         if len(places) > 1:
-            raise InputError(f"{self.numbers.where}: {len(places)} ball joints hold it.", "Leave one.")
+            raise InputError(f"{self.numbers.where}: it has {len(places)} ball joints.", "Leave one.")
         return places[0] if places else None
 
     def held(self, name: str) -> Element:
@@ -477,7 +484,9 @@ def _mjcf(path: Path, root: Element) -> Iterator[Link]:
     """Bodies with an inertial element, read exactly; those that MuJoCo computes or includes, read by MuJoCo."""
     settings = {key: value for compiler in root.iter("compiler") for key, value in compiler.attrib.items()}
     if settings.get("coordinate", "local") != "local":
-        raise InputError(f"{path} has global coordinates.", "Load and save it in MuJoCo 2.3.3, which makes them local.")
+        raise InputError(
+            f"{path} uses global coordinates.", "Load and save it in MuJoCo 2.3.3, which makes them local."
+        )
     fused = any(settings.get(key, "auto") not in ("auto", "false") for key in ("inertiafromgeom", "fusestatic"))
     if fused or exact(settings.get("settotalmass", "-1")) > 0 or root.find(".//include") is not None:
         yield from _included(path, set())
@@ -549,7 +558,7 @@ def _compiled(path: Path) -> Any:
     try:
         return mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
-        raise InputError(f"MuJoCo refuses {path}: {' '.join(str(error).split())}.", "Mend the file.") from None
+        raise InputError(f"MuJoCo refuses {path}: {' '.join(str(error).split())}.", "Correct the file.") from None
 
 
 def by_mujoco(path: Path, name: str, index: int) -> BodyInFile:
@@ -773,7 +782,7 @@ def composed_usd(path: Path) -> Iterator[Link]:
     except Tf.ErrorException as error:
         faults = [part.commentary for part in error.args]
     if faults:
-        raise InputError(f"USD refuses {path}: {'; '.join(faults)[:200]}.", "Mend the file, or its layers.")
+        raise InputError(f"USD refuses {path}: {'; '.join(faults)[:200]}.", "Correct the file or its layers.")
     units = {
         "metersPerUnit": exact(repr(UsdGeom.GetStageMetersPerUnit(stage))),
         "kilogramsPerUnit": exact(repr(UsdPhysics.GetStageKilogramsPerUnit(stage))),
@@ -823,12 +832,12 @@ def _toml_table(name: str, table: Mapping[str, Any]) -> BodyInFile:
     mass = numbers.one(str(table["mass"]), "mass")
     if table.get("about") not in ("pivot", "centre of mass") and (any(centre) or "about" in table):
         raise InputError(
-            f"{numbers.where}: it is not said which point the inertia tensor is about.",
+            f"{numbers.where}: the reference point of the inertia tensor (about) is missing.",
             'Give about = "pivot" or about = "centre of mass".',
         )
     if table.get("rotor"):
         raise InputError(
-            f"{numbers.where}: a rotor is not read from a file.", "Give the keys of the body in place of it."
+            f"{numbers.where}: a rotor in a file is not supported.", "Give mass, centre and inertia of the whole body."
         )
     gravity = (Fraction(0), Fraction(0), -numbers.one(str(table.get("gravity", "9.81")), "gravity"))
     return BodyInFile(name, mass, centre, six, slack, gravity=gravity, at_pivot=table.get("about") == "pivot", si=False)

@@ -212,14 +212,15 @@ def rotor(top: HeavyTop, start: State) -> Fraction:
     area: Fraction = dot(momentum, start.gamma)
     if area == 0:
         raise InputError(
-            "The gyrostat needs M·gamma != 0: its lambda is P b / (M·gamma).", "Choose a start that turns about gamma."
+            "The gyrostat needs M·gamma != 0: its lambda is P b / (M·gamma).",
+            "Choose a start with a rotation about gamma.",
         )
     across = cross(momentum, start.gamma)
     if any(across):
         raise InputError(
             "The gyrostat needs gamma parallel to M, as (2.1) claims: "
             f"M x gamma = ({', '.join(f'{float(x):.6g}' for x in across)}).",
-            "Take gamma = M/|M| with a rational |M|.",
+            "Give gamma = M/|M| with a rational |M|.",
         )
     return top.moment[1] / area
 

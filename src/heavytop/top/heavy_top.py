@@ -33,7 +33,7 @@ _SHOWN_BITS = 64
 _ATTITUDE_BITS = 256
 _NEAR_BITS = 10
 """Bits of the unit vector that an error suggests: enough to show which one was meant."""
-_NO_DIRECTION = "gamma is the zero vector, which has no direction."
+_NO_DIRECTION = "gamma must not be zero."
 _UPWARDS = "Give the direction that points vertically up."
 _NORMALIZE = (
     "Give rational components such as 3/5,0,4/5, or move gamma onto the sphere: --normalize on the command line, "
@@ -73,8 +73,8 @@ class HeavyTop:
         for axis, value in enumerate(moments, 1):
             if value <= 0:
                 raise InputError(
-                    f"The principal moment I{axis} = {shown(value)} is not positive.",
-                    "Moments of inertia are positive numbers.",
+                    f"The principal moment I{axis} must be positive; got {shown(value)}.",
+                    "Give positive moments of inertia.",
                 )
         try:
             load = exact(weight)
@@ -162,19 +162,22 @@ class State:
         omega_space: Iterable[Any] | None = None,
     ) -> None:
         if (omega is None) == (omega_space is None):
-            which = "both omega and omega_space were" if omega is not None else "neither omega nor omega_space was"
-            raise InputError(f"Of the angular velocity {which} given.", "Give one of them: body axes, or space axes.")
+            which = "both" if omega is not None else "neither"
+            raise InputError(
+                f"Exactly one of omega and omega_space must be given; got {which}.",
+                "Give omega in body axes, or omega_space in space axes.",
+            )
         if attitude is None:
             if gamma is None:
                 raise InputError("Neither gamma nor an attitude was given.", "Give gamma, or an Attitude.")
             if omega_space is not None:
-                raise InputError("omega_space without an attitude.", "Give an Attitude, or omega in body axes.")
+                raise InputError("omega_space needs an attitude.", "Give an Attitude, or omega in body axes.")
             up = vector(gamma, "gamma")
         else:
             if not isinstance(attitude, Attitude):
                 raise InputError(
-                    f"attitude = {quoted(attitude)} is not an Attitude.",
-                    "Use Attitude.quaternion(w, x, y, z) or another.",
+                    f"attitude must be an Attitude; got {quoted(attitude)}.",
+                    "Use Attitude.quaternion(w, x, y, z) or another constructor.",
                 )
             up = attitude.rational_rows(_ATTITUDE_BITS)[2]
             if gamma is not None:
@@ -410,12 +413,12 @@ def _check_each(values: list[Fraction]) -> None:
     for earlier, later in zip([Fraction(0), *values], values, strict=False):
         if earlier * later < 0:
             raise InputError(
-                f"The times {shown(earlier)} and {shown(later)} have different signs.", "Run each direction by itself."
+                f"The times {shown(earlier)} and {shown(later)} have different signs.", "Run each direction separately."
             )
         if abs(later) <= abs(earlier) and (later or earlier):
             raise InputError(
-                f"The time {shown(later)} does not come after {shown(earlier)}.",
-                "Times go strictly away from 0, each once.",
+                f"Times must move strictly away from 0; got {shown(later)} after {shown(earlier)}.",
+                "Sort them, and give each once.",
             )
     if values.count(Fraction(0)) > 1:
-        raise InputError("The time 0 is given more than once.", "Times go strictly away from 0, each once.")
+        raise InputError("The time 0 was given more than once.", "Sort them, and give each once.")

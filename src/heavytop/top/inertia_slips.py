@@ -195,12 +195,14 @@ def slips(body: MassProperties) -> list[Slip]:
 
 def _rod(body: MassProperties) -> Slip:
     if not any(six_of(body.central)):
-        sentence = "All moments are 0, as of a point mass: its rotation has no equation. Give the body its moments."
+        sentence = (
+            "All moments are 0, as of a point mass, whose rotation has no equation of motion. Give positive moments."
+        )
         return Slip("point_mass", sentence, body.six)
     return Slip(
         "rod",
-        "A principal moment is 0, as of a rod without thickness: the rotation about it has no equation. "
-        "Give the rod its radius r, so that the moment is m r^2/2.",
+        "A principal moment is 0, as of a rod without thickness: the rotation about its axis has no equation of "
+        "motion. Give the rod a radius r: the moment is m r^2/2.",
         body.six,
     )
 
@@ -225,7 +227,7 @@ def _mends(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
     if flipped != n:
         yield _mend(body, "signs_of_products", sentence, flipped)
     if not body.at_pivot and any(body.centre):
-        sentence = "The tensor was about the centre of mass already when Steiner's part was subtracted from it."
+        sentence = "The tensor was already about the centre of mass when the Steiner term was subtracted."
         yield _mend(body, "about_centre", sentence, six_of(plus(rows(n), steiner(body.mass, body.centre))))
     if negative := sum(value < 0 for value in n[:3]):
         cause = "A moment of inertia is negative: its sign is" if negative == 1 else "Signs of moments of inertia are"
@@ -291,7 +293,7 @@ def _of_units(body: MassProperties) -> Iterator[Slip]:
     if not size:
         return
     if dot(body.centre, body.centre) > (_FAR_CENTRE * size) ** 2:
-        sentence = "The centre of mass is in millimetres: it lies more than a hundred sizes of the body away."
+        sentence = "The centre of mass is in millimetres: it lies more than 100 times the size of the body away."
         yield Slip("millimetres", sentence, body.six, centre=_metres(body.centre))
     density = float(body.mass) / size**3
     if 5 * density > _DENSEST:  # the box of this diagonal has at most its cube / 3√3
@@ -328,9 +330,8 @@ def _of_products(body: MassProperties) -> Iterator[Slip]:
     less = six_of(minus(rows(body.six), steiner(body.mass, body.centre)))
     with_part, without = _products(body), max(map(abs, less[3:]))
     if with_part > body.slack and without * _ROUND <= with_part and realisable(rows(less), body.slack):
-        sentence = (
-            "The tensor is about the pivot, and was read as about the centre of mass: its products are Steiner's."
-        )
+        sentence = "The tensor is about the pivot, and was read as about the centre of mass: its products of inertia "
+        sentence += "are those of the Steiner term."
         yield Slip("about_pivot", sentence, less)
 
 

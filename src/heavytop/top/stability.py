@@ -42,9 +42,11 @@ class Stability:
     def why(self) -> str:
         """The reason of the verdict; empty where an eigenvalue or an energy proves it."""
         if self.drift:
-            return f": a part ε of Ω along the axis of symmetry turns it away linearly, by {self.drift:.4g} ε t"
+            return (
+                f": a component ε of Ω along the axis of symmetry makes it drift away linearly, by {self.drift:.4g} ε t"
+            )
         return (
-            ": no eigenvalue proves it unstable, and nothing proves it stable"
+            ": no eigenvalue has a positive real part, and stability is not proven"
             if self.verdict.startswith("spec")
             else ""
         )

@@ -206,7 +206,7 @@ def test_a_sleeping_top_is_right_in_any_columns(tmp_path: Path) -> None:
         ({"sequence": "ZZX"}, "sequence = 'ZZX' is not known"),
         ({"mass": "1"}, "weight and mass are both given"),
         ({"mass": "1", "weight": ""}, "The key gravity is missing"),
-        ({"mass": "1", "gravity": "9.81", "weight": ""}, "which point the inertia tensor is about"),
+        ({"mass": "1", "gravity": "9.81", "weight": ""}, "reference point of the inertia tensor"),
         ({"system": "gyrostat"}, "not scored in the system gyrostat"),
         ({"pivot": "1, 2"}, "pivot must be 3 numbers; got '1, 2'"),
         ({"inertia": "1, 1, nan"}, "nan"),

@@ -160,7 +160,7 @@ class Declared:
 
     def __post_init__(self) -> None:
         if not all(map(any, self.singular_at)):
-            raise InputError("singular_at holds the zero vector, which has no direction.", "Give γ, such as 0, 0, 1.")
+            raise InputError("A γ in singular_at must not be zero.", "Give γ, such as 0, 0, 1.")
 
     def require(
         self,
