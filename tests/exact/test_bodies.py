@@ -212,11 +212,11 @@ def test_principal_axes_change_no_bit_and_permutations_round_nothing() -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: ht.Body(0, 1, (0, 0, 0), (1, 1, 1)), "mass = 0"),
+        (lambda: ht.Body(0, 1, (0, 0, 0), (1, 1, 1)), "mass must be positive; got 0"),
         (lambda: ht.Body(1, "-9.81", (0, 0, 0), (1, 1, 1)), "negative"),
         (lambda: ht.Body(1, 1, (0, 0, 1), (1, 1, 1)), "reference point of the inertia tensor"),
         (lambda: ht.Body(1, 1, (0, 0, 1), (1, 1, 1), "the end"), "'the end'"),
-        (lambda: ht.Body(1, 1, (0, 0, 0), (1, 1)), "2 numbers"),
+        (lambda: ht.Body(1, 1, (0, 0, 0), (1, 1)), "3, 6 or 9 numbers; got 2"),
         (lambda: ht.Body(1, 1, (0, 0, 0), [[1, 2, 0], [0, 1, 0], [0, 0, 1]]), "not symmetric: I12 = 2, I21 = 0"),
         (lambda: ht.Body(1, 1, (0, 0, 0), [[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]), "not symmetric: I12 = 0.1, I21 = 0"),
         (lambda: ht.Body(1, 1, (0, 0, 0), (1, 1, 1, 2, 0, 0)), "principal moments of inertia must be positive"),
@@ -224,10 +224,10 @@ def test_principal_axes_change_no_bit_and_permutations_round_nothing() -> None:
         (lambda: ht.Body("nan", 1, (0, 0, 0), (1, 1, 1)), "nan"),
         (lambda: ht.State((0, 0, 1)), "Neither gamma"),
         (lambda: ht.State(gamma=(0, 0, 1)), "got neither"),
-        (lambda: ht.State((0, 0, 1), (0, 0, 1), omega_space=(0, 0, 1)), "both omega"),
-        (lambda: ht.State(gamma=(0, 0, 1), omega_space=(0, 0, 1)), "without an attitude"),
+        (lambda: ht.State((0, 0, 1), (0, 0, 1), omega_space=(0, 0, 1)), "got both"),
+        (lambda: ht.State(gamma=(0, 0, 1), omega_space=(0, 0, 1)), "omega_space needs an attitude"),
         (lambda: ht.State((0, 0, 1), (1, 0, 0), attitude=ht.Attitude.quaternion(1, 0, 0, 0)), "contradicts"),
-        (lambda: ht.State((0, 0, 1), attitude="up"), "not an Attitude"),  # type: ignore[arg-type]
+        (lambda: ht.State((0, 0, 1), attitude="up"), "must be an Attitude"),  # type: ignore[arg-type]
     ],
 )
 def test_what_is_no_body_or_start_is_refused(make: Any, message: str) -> None:
