@@ -146,10 +146,30 @@ def rated(kind: str, more: str) -> str:
 NANO = [f"{17 * 10**17 + k * 10**8}" for k in range(11)]
 SPLIT = [f"{1700000000 + k // 10},{k % 10 * 100000000}" for k in range(11)]
 BASILISK = ",".join(f"{name}[{k}]" for name in ("sigma_BN", "omega_BN_B") for k in range(3))
+BASILISK_1 = "sigma_BN_1,sigma_BN_2,sigma_BN_3,omega_BN_B1,omega_BN_B2,omega_BN_B3"
 TO_BODY = "REF_FRAME_A = EME2000\nREF_FRAME_B = SC_BODY_1\nRATE_FRAME = REF_FRAME_B"
 FROM_BODY = "ATTITUDE_DIR = B2A\nREF_FRAME_A = SC_BODY_1\nREF_FRAME_B = ICRF"
 FORMS |= {
     "ROS": ("csv", lambda: exported("stamp.sec,stamp.nanosec", SPLIT, "pose.orientation.", "twist.angular.")),
+    "ROS as pandas writes it": (
+        "csv",
+        lambda: exported(
+            "stamp.sec,stamp.nanosec", [f"{text}.0" for text in SPLIT], "pose.orientation.", "twist.angular."
+        ),
+    ),
+    "nanoseconds of several seconds": (
+        "csv",
+        lambda: exported("stamp.sec,stamp.nanosec", [f"17,{k}00000000" for k in range(11)], "orientation.", "angular."),
+    ),
+    "rostopic with two stamps": (
+        "csv",
+        lambda: exported(
+            "%time,field.header.stamp",
+            [f"{int(time) + 7 * k * k},{time}" for k, time in enumerate(NANO)],
+            "field.orientation.",
+            "field.angular_velocity.",
+        ),
+    ),
     "rostopic": ("csv", lambda: exported("%time", NANO, "field.orientation.", "field.angular_velocity.")),
     "PlotJuggler": (
         "csv",
@@ -160,6 +180,7 @@ FORMS |= {
         lambda: exported("time_ms", [str(100 * k) for k in range(11)], "pose_orientation_", "pose_angular_"),
     ),
     "Basilisk": ("csv", lambda: f"{HEAD}time,{BASILISK}\n{rows(TIMES, mrp(), omegas())}"),
+    "Basilisk from 1": ("csv", lambda: f"{HEAD}time,{BASILISK_1}\n{rows(TIMES, mrp(), omegas())}"),
     "ephemeris with rates": ("aem", lambda: rated("QUATERNION/RATE", TO_BODY)),
     "ephemeris from the body": ("aem", lambda: ephemeris().replace("ATTITUDE_DIR = A2B", FROM_BODY)),
 }
@@ -319,14 +340,23 @@ def test_half_a_file_is_never_scored(names: str, says: str, tmp_path: Path) -> N
     assert says in refusal(tmp_path / "log.csv", HEAD + names + "\n" + rows(TIMES, *columns))
 
 
+@pytest.mark.parametrize("first", [12_345_678, 0])
 @pytest.mark.parametrize(("unit", "code"), [("", 2), (" [us]", 0)])
-def test_times_in_whole_numbers_far_apart_need_a_unit(unit: str, code: int, tmp_path: Path) -> None:
+def test_times_in_whole_numbers_far_apart_need_a_unit(unit: str, code: int, first: int, tmp_path: Path) -> None:
     """As those of PX4, in microseconds since the start."""
     path = tmp_path / "log.csv"
-    ticks = [12_345_678 + int(time * 1_000_000) for time in TIMES]
+    ticks = [first + int(time * 1_000_000) for time in TIMES]
     path.write_text(HEAD + f"timestamp{unit},qw,qx,qy,qz\n" + rows(ticks, quaternions()))
     done = heavytop("score", path)
     assert (done.returncode, "Name the column timestamp [us]" in done.stderr) == (code, code == 2)
+
+
+def test_without_a_reference_and_omega_nothing_is_measured(tmp_path: Path) -> None:
+    """Nanoseconds in a column that is called time: no reference reaches so far, and an attitude has no energy."""
+    path = tmp_path / "log.csv"
+    path.write_text(HEAD + "time,qw,qx,qy,qz\n" + rows([int(time * 10**9) for time in TIMES], quaternions()))
+    done = heavytop("score", path)
+    assert "there is no reference.\n\nlog: given" in done.stdout, done.stdout + done.stderr
 
 
 def test_of_a_free_body_omega_alone_is_scored_and_its_fall_is_left_out(tmp_path: Path) -> None:
@@ -347,6 +377,9 @@ def test_stamps_of_a_start_that_is_given_are_counted_from_it(tmp_path: Path) -> 
     said = HEAD + f"# start_quaternion: {', '.join(map(str, quaternions()[0]))}\nstamp.sec,stamp.nanosec,qw,qx,qy,qz\n"
     lines = rows(quaternions()).splitlines()
     path = tmp_path / "log.csv"
+    of_px4 = said.replace("stamp.sec,stamp.nanosec", "timestamp [us]")
+    path.write_text(of_px4 + "\n".join(f"{10**5 * k},{lines[k]}" for k in range(1, len(lines))))
+    assert digits(path) > 13
     for first, begin in ((0, 1), (15 * 10**8, 0)):
         stamps = [f"{first + int(time)},{round(time % 1 * 10**9)}" for time in TIMES]
         path.write_text(said + "\n".join(map(",".join, [*zip(stamps, lines, strict=True)][begin:])))

@@ -345,9 +345,10 @@ def answer(row: Row, peer: Peer | None) -> list[str]:
     digits = digits_kept(row)
     lines = []
     if row.outcome != "success":
-        lines.append(f"The run ended early ({row.outcome}), at t = {row.time_reached} of {row.horizon}.")
+        lines.append(f"The run ended early ({row.outcome}), at t = {short(row.time_reached)} of {short(row.horizon)}.")
     if digits is None:
-        unknown = "How many digits are right is not known: there is no reference. Drift is measured."
+        drifts = any(metric.quantity and metric.quantity.name == DRIFT for metric in row.metrics.values())
+        unknown = "How many digits are right is not known: there is no reference." + " Drift is measured." * drifts
         return [*lines, unknown if row.samples else "No digit can be counted: the first state is not finite."]
     where = "every sample up to" if row.samples > 1 else "its one sample,"
     said = f"{digits_text(digits)} of {digits_of(row.bits)} digits right at {where} T = {short(row.time_reached)}"
@@ -432,10 +433,14 @@ def sizes(row: Row) -> list[list[Cell]]:
 def score_text(assessment: Assessment) -> RenderableType:
     """Digits right, distance from the known motion, drift of every first integral, what explains the error."""
     row = assessment.row
-    numbers = Lines(["", f"largest over {plural(row.samples, 'sample')}", "rms", "final"], sizes(row))
+    lines = sizes(row)
+    table: list[RenderableType] = [
+        Lines(["", f"largest over {plural(row.samples, 'sample')}", "rms", "final"], lines),
+        Text(),
+    ]
     about = f"{row.case}: {row.integrator}, {row.system.replace('_', ' ')} in {row.precision} ({row.bits} bits)"
     parts: list[RenderableType] = [Text(line) for line in answer(row, assessment.peer)]
-    parts += [Text(), numbers, Text(), *_wrapped(about), *_wrapped(f"Reference: {row.reference.brief}.")]
+    parts += [Text(), *(table if lines else []), *_wrapped(about), *_wrapped(f"Reference: {row.reference.brief}.")]
     explained = told(assessment)
     if explained:
         parts += [Text(), *(line for text in explained for line in _wrapped(text))]

@@ -235,8 +235,9 @@ def _is_number(text: str) -> bool:
 def _is_header(names: list[str], width: int) -> bool:
     """Whether the words of a comment name the columns, of rows of this width."""
     header = observed_columns.header(list(dict.fromkeys(names)))  # one that stands twice is refused where it is used
+    has_time = header.time is not None or names[0] == "%time"
     return len(header.of_state()) == len(COLUMNS) or (
-        header.time is not None and bool(header.places) and (not header.others or len(names) == width > 2)
+        has_time and bool(header.places) and (not header.others or len(names) == width > 2)
     )
 
 

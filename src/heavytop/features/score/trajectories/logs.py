@@ -42,9 +42,9 @@ _ALIASES = tuple(
         (r"(?:receive|publish|log|record)_?time", "epoch"),
         (r"(?:timestamp|stamp)_?(ns|us|ms)", "timestamp [{}]"),
         (r"(?:time|t)_?(ns|us|ms)", "t [{}]"),
-        (r"%time", "timestamp [ns]"),
-        (r"sigma_BN[\[_(]([0-2])[\])]?", "sigma{}"),
-        (r"omega_BN_B[\[_(]([0-2])[\])]?", "omega{}"),
+        (r"%time", "epoch [ns]"),
+        (r"sigma_BN[\[_(]?([0-3])[\])]?", "sigma{}"),
+        (r"omega_BN_B[\[_(]?([0-3])[\])]?", "omega{}"),
     )
 )
 _JOINTS = {"free": (3, 3), "ball": (0, 0)}
@@ -114,6 +114,7 @@ def require_understood(names: Sequence[str], others: Sequence[str], quantities: 
 
 
 _TEN_DAYS = 864_000
+_PER_SECOND = {"ms": 10**3, "us": 10**6, "ns": 10**9}
 _OF_1970 = 10**9, 4 * 10**9
 """Seconds since 1970 in the years 2001 to 2096: no motion begins so long before its first row."""
 _LONG = 500
@@ -134,9 +135,11 @@ def with_one_time(
     if parts.keys() == {"s", "n"}:
         seconds, nano = parts["s"], parts["n"]
         for row in cells:
-            row[seconds] = f"{row[seconds]}.{row[nano].strip():0>9}"
+            whole, part = number(row[seconds]), number(row[nano])
+            if whole is not None and part is not None:
+                row[seconds] = decimal_text(whole + part / 10**9, 40)
             del row[nano]
-        names[seconds] = "timestamp"
+        names[seconds] = "timestamp [s]"
         del names[nano]
     plain = [canonical(name) for name in names]
     words = [name.partition(" ")[0] for name in plain]
@@ -145,7 +148,7 @@ def with_one_time(
         return names, cells, []
     names[index] = re.sub(r"^\w+", "t", plain[index])
     first = number(cells[0][index])
-    if not first or (started and names[index] == "t" and abs(first) < _TEN_DAYS):
+    if first is None:
         return names, cells, []
     if names[index] == "t":
         names[index] += next((f" [{unit}]" for least, unit in _EPOCH_UNITS if first >= least), "")
@@ -153,6 +156,9 @@ def with_one_time(
     if names[index] == "t" and second and second - first >= _LONG and first.denominator == second.denominator == 1:
         apart = f"The first {plain[index]}s are integers {decimal_text(second - first, 12)} apart, without a unit."
         raise InputError(apart, f"Name the column {plain[index]} [us], [ms] or [ns], or [s] for seconds.")
+    unit = names[index][1:].strip(" []()")
+    if first == 0 or (started and abs(first) < _TEN_DAYS * _PER_SECOND.get(unit, 1)):
+        return names, cells, []
     note = f"times are counted from the first row, {decimal_text(first, 20)}{_kept([row[index] for row in cells])}"
     for row in cells:
         if (value := number(row[index])) is not None:
