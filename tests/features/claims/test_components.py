@@ -108,6 +108,46 @@ def test_eulers_component_obeys_its_quartic(value: str, verdict: str) -> None:
     assert audited(table).verdict == verdict
 
 
+# the first component of a free symmetric body: Ω1 = cos t, and f = 1 − u²
+CIRCLE: dict[str, Any] = {
+    "kind": "component",
+    "top": top("2 2 1", "0 0 0", "0"),
+    "start": {"omega": ["1", "0", "2"], "gamma": ["0", "0", "1"]},
+    "component": {"quantity": "Omega1", "constants": ["Omega3"], "reduced": "1 - u^2"},
+}
+
+
+@pytest.mark.parametrize(
+    ("value", "domain", "verdict"),
+    [
+        ("cos(t)", "all", "holds"),
+        ("sin(2*t)/(2*sin(t))", "all", "holds"),  # 0/0 at the start
+        ("sin(t)/tan(t)", "t>0", "holds"),
+        ("cos(asin(sin(t)))", "all", "undecided"),  # |cos t|: its rate jumps
+        ("sqrt(cos(t)^2)", "all", "undecided"),
+        ("cos(t + (atan2(-t, -1) - atan(t) - pi)/4)", "t>0", "undecided"),  # cos t at t = 0, then sin t
+        ("cos(t + sqrt(t^2)/t - 1)", "t<=0", "undecided"),  # not defined at the start
+    ],
+)
+def test_a_function_of_time_is_smooth_and_defined_from_its_start(value: str, domain: str, verdict: str) -> None:
+    assert audited(CIRCLE | {"domain": domain, "component": CIRCLE["component"] | {"value": value}}).verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("integrand", "verdict"),
+    [
+        ("1/sqrt(1 - u^2)", "holds"),
+        ("1/(sqrt(1 - u)*sqrt(1 + u))", "holds"),
+        ("sqrt(-1 - u^2)/(sqrt(1 + u^2)*sqrt(u^2 - 1))", "undecided"),
+        ("1/sqrt(1 - u^2) + 0*log(u - 5)", "undecided"),
+    ],
+)
+def test_an_integrand_is_real_where_the_component_moves(integrand: str, verdict: str) -> None:
+    component = {"quantity": "Omega1", "constants": ["Omega3"]}
+    table = CIRCLE | {"component": component, "quadrature": {"variable": "u", "integrand": integrand}}
+    assert audited(table).verdict == verdict
+
+
 SEED: dict[str, Any] = {
     "kind": "component",
     "parameters": {"C1": ["1", "3/2"]},

@@ -258,6 +258,8 @@ class Field:
             return self.transcendental.exponential(self.enter(sympy.log(e) if e is sympy.E else e.args[0]))
         if e.is_Pow:
             return self._power(e)
+        if not e.args:
+            raise Unprovable(f"{e} is no number.")
         return self._function(type(e).__name__, [self.enter(part) for part in e.args])
 
     def _definition(self, e: Defined) -> Quotient:

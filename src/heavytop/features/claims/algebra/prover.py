@@ -526,7 +526,7 @@ class Prover:
 
     def _conditions_of(self, statement: Statement) -> list[Condition]:
         domain, f = statement.domain, statement.formulas
-        ends = domain.label == "t<=0" and not domain.note  # 0 is an end that belongs to the domain
+        ends = domain.label in ("t<=0", "t>=0") and not domain.note  # 0 is an end that belongs to the domain
         everywhere = self._region(statement, domain.sign, strict=bool(domain.sign) and not ends)
         inner = self._region(statement, domain.sign, strict=True) if ends else everywhere
         if everywhere is None or inner is None:

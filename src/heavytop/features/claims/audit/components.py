@@ -18,9 +18,10 @@ import sympy
 from heavytop.errors import InputError
 from heavytop.features.claims.algebra.conditions import ConditionKind, Need, condition, is_exactly_zero
 from heavytop.features.claims.algebra.fields import Assumptions, Field
+from heavytop.features.claims.algebra.prover import shortest
 from heavytop.features.claims.algebra.rational import forces_zero
 from heavytop.features.claims.algebra.reader import Formula, parse, symbol
-from heavytop.features.claims.algebra.statement import ALL, TIME, Flow, Formulas, Point, Setting, Statement
+from heavytop.features.claims.algebra.statement import AFTER, ALL, TIME, Flow, Formulas, Point, Setting, Statement
 from heavytop.features.claims.algebra.structure import at_values, rate_along, rational_values
 from heavytop.features.claims.audit.context import (
     DOMAINS,
@@ -43,6 +44,8 @@ _POLE = "gamma is not vertical in the body: elsewhere phi and psi are undefined"
 _IN_TIME = rate_along({TIME: sympy.Integer(1)})
 _AT_A_STATE = replace(ALL, points=(Fraction(0),))
 _ANGLES = ("phi", "theta", "psi")
+_FROM_START = DOMAINS | {"t>0": replace(AFTER, label="t>=0")}
+"""The domains of a function of time with its start, which belongs to it."""
 
 
 def _rate_of_angle(name: str, omega: tuple[sympy.Expr, ...]) -> tuple[sympy.Expr, sympy.Expr]:
@@ -117,14 +120,20 @@ class UserComponent(UserIntegral):
         return [] if values is None else [dict(zip(STATE, values, strict=True))]
 
     @cached_property
+    def _quadrature(self) -> Formula | None:
+        """F(u) or F'(u), where f(u) is given by it."""
+        table = None if self._component.reduced is not None else self.content.quadrature
+        text = None if table is None else table.time or table.integrand
+        return None if text is None else parse(text, self.context.names, "quadrature")
+
+    @cached_property
     def _square(self) -> Formula | None:
         """f(u)."""
-        table, names = self.content.quadrature, self.context.names
+        table, quadrature = self.content.quadrature, self._quadrature
         if self._component.reduced is not None:
-            return parse(self._component.reduced, names, "component.reduced")
-        if table is None or (table.time is None and table.integrand is None):
+            return parse(self._component.reduced, self.context.names, "component.reduced")
+        if table is None or quadrature is None:
             return None
-        quadrature = parse(table.time or table.integrand or "", names, "quadrature")
         slope = (
             quadrature.expression
             if table.time is None
@@ -173,6 +182,9 @@ class UserComponent(UserIntegral):
         omega = tuple(system.angular_velocity(self.context.parameters(system), STATE))
         in_u: list[Statement] = []
         on_state: list[Statement] = []
+        # an integrand may be real between two values of u alone: it must be where u moves
+        of_time: frozenset[Need] = frozenset() if self._quadrature is None else self._quadrature.needs
+        moved = replace(ALL, points=self._shortly_after(system) or ALL.points) if of_time else ALL
         claims: list[tuple[str, int, sympy.Expr, sympy.Expr, sympy.Expr, str, frozenset[Need]]] = []
         one, slope = sympy.Integer(1), rate(q.expression)
         if self._square is not None:
@@ -197,14 +209,28 @@ class UserComponent(UserIntegral):
             needs = frozenset(_off_pole(need, u if through else None) for need in _put(needs, put))
             if through is not None and all(sympy.expand(e) == 0 for _, e in kept):
                 residual = sympy.numer(sympy.together(of_u * through[1] - through[0]))
-                formulas = Formulas((u,), _without(base, *STATE) | needs | condition("/", (through[2],)), pole=pole)
-                in_u.append(Statement(equation, index, "smooth", ALL, residual, text, formulas))
+                needs = _without(base, *STATE) | needs | condition("/", (through[2],))
+                sampled, domain = (needs | of_time, moved) if equation == "reduced" else (needs, ALL)
+                formulas = Formulas((u,), needs, pole=pole, sampled=sampled)
+                in_u.append(Statement(equation, index, "smooth", domain, residual, text, formulas))
             elif index == 1 or equation == "rate":
                 residual = sympy.numer(sympy.together(claimed.xreplace({u: q.expression}) * below - above))
                 flow = Flow(rate, frozenset(STATE), kept, False, (OFF_SPHERE,))
                 formulas = Formulas(STATE, base | needs, pole=pole)
                 on_state.append(Statement(equation, index, "smooth", _AT_A_STATE, residual, text, formulas, flow))
         return in_u, on_state
+
+    def _shortly_after(self, system: System) -> tuple[Fraction, ...]:
+        """Values of u on the way of the motion from each sample, to the second order in a short time."""
+        first = self._rate(system)(self.quantity.expression)
+        parts = (self.quantity.expression, first, self._rate(system)(first))
+        points: dict[Fraction, None] = {}
+        for sample in self.at_states.samples:
+            if values := rational_values(parts, sample):
+                u, speed, acceleration = values
+                times = (Fraction(1, 2**8), Fraction(1, 2**16))
+                points |= dict.fromkeys(u + speed * time + acceleration * time**2 / 2 for time in times)
+        return tuple(points)
 
     def _known_components(self) -> dict[sympy.Expr, sympy.Expr]:
         """Components of the state in terms of u and of constants, where first integrals are components."""
@@ -232,15 +258,17 @@ class UserComponent(UserIntegral):
         value = self._of("value", self._component)
         if value is None or self._square is None:
             return []
-        c, u, f = value.expression, self._u, self._square.expression
-        domain = DOMAINS[self.content.domain]
+        u, f, domain = self._u, self._square.expression, _FROM_START[self.content.domain]
+        c = shortest(value.expression, setting_of(self.context, TIME), domain)
+        first, second = _IN_TIME(c), _IN_TIME(_IN_TIME(c))
+        # one solution begins with u and u' if u' is continuous, and if f' has a continuous derivative
+        regular = (c, first) if f.is_rational_function(u) else (c, first, sympy.diff(f, u, 2).xreplace({u: c}))
         along = _put(self._square.needs, {u: c})
-        formulas = Formulas((c,), value.needs | along | self.context.needs)
+        formulas = Formulas(regular, value.needs | along | self.context.needs)
 
         def made(equation: str, index: int, residual: sympy.Expr, text: str, extra: Formulas = formulas) -> Statement:
             return Statement(equation, index, "smooth", domain, residual, text, extra)
 
-        first, second = _IN_TIME(c), _IN_TIME(_IN_TIME(c))
         equations = [
             made("component", 1, first**2 - f.xreplace({u: c}), "u'^2 = f(u) of the function of t"),
             made("component", 2, second - sympy.diff(f, u).xreplace({u: c}) / 2, "u'' = f'(u)/2 of the function of t"),
