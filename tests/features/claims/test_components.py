@@ -148,6 +148,16 @@ def test_an_integrand_is_real_where_the_component_moves(integrand: str, verdict:
     assert audited(table).verdict == verdict
 
 
+@pytest.mark.parametrize(
+    ("square", "verdict"), [("1 - u^2", "holds"), ("1 - 2*u^2", "refuted"), ("1 - u^2/Omega1^2", "refuted")]
+)
+def test_definitions_too_large_to_substitute_are_of_the_component(square: str, verdict: str) -> None:
+    """As symbols they would hide u and the state."""
+    growing = {f"f{i + 1}": f"f{i} + f{i} - f{i}" for i in range(7)}
+    table = CIRCLE | {"definitions": {"f0": square} | growing}
+    assert audited(table | {"component": CIRCLE["component"] | {"reduced": "f7"}}).verdict == verdict
+
+
 SEED: dict[str, Any] = {
     "kind": "component",
     "parameters": {"C1": ["1", "3/2"]},

@@ -58,6 +58,16 @@ def _rate_of_angle(name: str, omega: tuple[sympy.Expr, ...]) -> tuple[sympy.Expr
     return omega[0] * _GAMMA[1] - omega[1] * _GAMMA[0], sympy.sqrt(_ACROSS)
 
 
+def _read(text: str, names: Mapping[str, Formula], where: str) -> Formula:
+    """The formula of a text, without symbols for definitions: u and the state are substituted in it."""
+    return _expanded(parse(text, names, where))
+
+
+def _expanded(formula: Formula) -> Formula:
+    needs = (replace(need, expression=at_values(need.expression, {})) for need in formula.needs)
+    return replace(formula, expression=at_values(formula.expression, {}), needs=frozenset(needs))
+
+
 class UserComponent(UserIntegral):
     """A component claimed in a file; its statements on the state are on the relations with the values of the start."""
 
@@ -83,14 +93,15 @@ class UserComponent(UserIntegral):
     def __init__(self, content: ClaimFile) -> None:
         super().__init__(content)
         names, table, start = self.context.names, self._component, content.start
-        self.quantity = parse(table.quantity, names, "component.quantity")
+        self.quantity = _read(table.quantity, names, "component.quantity")
         self._check(table, self.quantity)
         self.start: tuple[Formula, ...] = ()
         if start is not None and start.omega is not None and start.gamma is not None:
-            self.start = (*three(start.omega, names, "start.omega"), *three(start.gamma, names, "start.gamma"))
+            parts = (*three(start.omega, names, "start.omega"), *three(start.gamma, names, "start.gamma"))
+            self.start = tuple(map(_expanded, parts))
         elif start is not None or table.value is not None:
             raise InputError("[start] needs omega and gamma.", "Give the state at t = 0, in the parameters.")
-        self.where = (*self.where, *self._levels())
+        self.where = (*map(_expanded, self.where), *self._levels())
 
     def _check(self, table: ComponentTable, quantity: Formula) -> None:
         if not quantity.expression.free_symbols & frozenset(STATE):
@@ -105,7 +116,7 @@ class UserComponent(UserIntegral):
             return
         p = self.context.parameters(self.about(None))
         standard = [energy(p, STATE), area(p, STATE)]
-        constants = [parse(text, self.context.names, "component.constants") for text in self._component.constants]
+        constants = [_read(text, self.context.names, "component.constants") for text in self._component.constants]
         for formula in (*map(symbol, standard), *constants):
             yield replace(formula, expression=formula.expression - self._at_start(formula.expression))
 
@@ -124,14 +135,14 @@ class UserComponent(UserIntegral):
         """F(u) or F'(u), where f(u) is given by it."""
         table = None if self._component.reduced is not None else self.content.quadrature
         text = None if table is None else table.time or table.integrand
-        return None if text is None else parse(text, self.context.names, "quadrature")
+        return None if text is None else _read(text, self.context.names, "quadrature")
 
     @cached_property
     def _square(self) -> Formula | None:
         """f(u)."""
         table, quadrature = self.content.quadrature, self._quadrature
         if self._component.reduced is not None:
-            return parse(self._component.reduced, self.context.names, "component.reduced")
+            return _read(self._component.reduced, self.context.names, "component.reduced")
         if table is None or quadrature is None:
             return None
         slope = (
@@ -146,7 +157,7 @@ class UserComponent(UserIntegral):
         """A formula of a table, which may contain t in [component]; None where absent."""
         text = getattr(table, name, None)
         names = self.context.names | ({"t": symbol(TIME)} if table is self._component else {})
-        return None if text is None else parse(text, names, f"{name} of the claim")
+        return None if text is None else _read(text, names, f"{name} of the claim")
 
     # --- on the state -------------------------------------------------------------------------------------------------
 
