@@ -93,6 +93,8 @@ def test_neighbours_of_the_pendulum(change: dict[str, Any], verdict: str, why: s
         ("log(u)", "log(u)", (), "undecided"),
         ("log(u)", "log(u)", ("u > 0",), "holds"),
         ("sqrt(u^2)", "sqrt(u^2)", (), "undecided"),
+        ("u", "u + atan(u) + atan(1/u)", (), "undecided"),  # at no u for a time of pi
+        ("u", "u + atan(u) + atan(1/u)", ("u < 0",), "holds"),
         ("atan(u)", "atan(u)", (), "holds"),
         ("tan(u)", "tan(u)", (), "undecided"),
         ("tan(u)", "tan(u)", ("-1 < u < 1",), "holds"),

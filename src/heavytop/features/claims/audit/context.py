@@ -498,7 +498,7 @@ _BEYOND = (Fraction(1, 7), Fraction(3, 2))
 class Clock:
     """The variable in the formulas of a motion, and the derivative in time.
 
-    variable: t or u.  values: F' and 1/F', which have to be continuous; none where t itself is the variable.
+    variable: t or u.  values: F, if given, F' and 1/F', which have to be continuous; none where t is the variable.
     needs: of these, and of the bounds of u.
     """
 
@@ -547,7 +547,8 @@ def read_clock(content: ClaimFile, context: Context) -> Clock:
     label = ", ".join(table.where) or f"all {u}"
     domain = Domain(label, 0, _points(table, u, facts, context.samples), f"{u} is the variable of [quadrature]", facts)
     needs = needs_of([clock, *(side for pair in sides for side in pair)]) | condition("/", (integrand,))
-    return Clock(u, rate_along({u: 1 / integrand}), domain, (integrand, 1 / integrand), needs)
+    values = (integrand, 1 / integrand) if table.time is None else (clock.expression, integrand, 1 / integrand)
+    return Clock(u, rate_along({u: 1 / integrand}), domain, values, needs)
 
 
 def _points(

@@ -54,7 +54,7 @@ class ClaimedMotion:
     rate: the derivative in time.  rates: (φ', θ', ψ').
     constants: (|γ|², C0, C1) of (1.3); without them (1.3) states that the three are constant.
     needs: of Ω and γ.  attitude, angle_needs, pole: as in Formulas.
-    clock: of a quadrature, F' and 1/F', which have to be continuous for the motion to exist.
+    clock: of a quadrature, F, F' and 1/F', which have to be continuous for the motion to exist.
     identities: of a quaternion or a matrix, residuals that are 0 for an attitude, each with its equation.
     """
 
