@@ -23,6 +23,7 @@ from heavytop.precision import (
     cache_last_call,
     dot,
     exact,
+    exact_text,
     ordered,
     parse,
     physical,
@@ -170,7 +171,7 @@ def limit(value: Number | None, what: str) -> str | None:
     if value is None:
         return None
     number = physical(value, what)
-    return shown(number) if number == 0 or abs(number) > Fraction(1, 10**150) else "0"
+    return exact_text(number) if number == 0 or abs(number) > Fraction(1, 10**150) else "0"
 
 
 def flag(value: bool | None, what: str) -> bool | None:

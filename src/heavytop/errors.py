@@ -144,6 +144,12 @@ def prefixed(what: str) -> Iterator[None]:
         raise InputError(f"{what}: {error.cause}", error.remedy) from None
 
 
+def require_as_many(what: str, count: int, times: int) -> None:
+    """Raise InputError unless there are as many of ``what`` as times."""
+    if count != times:
+        raise InputError(f"times and {what} must be equally many; got {times} and {count}.", "Give one for each time.")
+
+
 class NotInClass(InputError):
     """A start outside the class of motions of a closed form; names the failed exact test and by how much it failed."""
 

@@ -106,7 +106,7 @@ def as_integer(value: Any, what: str) -> int:
             return index(value)
     except Exception:  # no integer, or a foreign __index__ that raises
         pass
-    raise InputError(f"{argument(what)} must be an integer; got {quoted(value)}.", "Give an integer such as 53.")
+    raise InputError(f"{argument(what)} must be an integer; got {quoted(value)}.", "Give an integer.")
 
 
 def available() -> dict[str, str | None]:
@@ -225,16 +225,18 @@ def _too_large(value: object) -> InputError:
     return InputError(f"The exponent of {quoted(value)} is too large.", f"Use exponents up to {_MAX_TEXT}.")
 
 
-def shown(value: Fraction) -> str:
-    """An exact number for a message: exact if that is short, else to six digits."""
-    short = max(value.numerator.bit_length(), value.denominator.bit_length()) < 100
+def shown(value: Fraction, most: int = 20) -> str:
+    """An exact number for a message: exact if that takes at most ``most`` characters, else to six digits."""
+    if max(value.numerator.bit_length(), value.denominator.bit_length()) < 100 and len(text := str(value)) <= most:
+        return text
     # rounded first: converting a fraction of a million digits to decimal takes seconds
-    return str(value) if short else decimal_text(round_to(value, 64), 6)
+    return six_digits(round_to(value, 64))
 
 
 def six_digits(value: Fraction) -> str:
     """A number for a sentence, to six digits without trailing zeros."""
-    return f"{float(decimal_text(value, 6)):.6g}"
+    text = decimal_text(value, 6)
+    return f"{float(text):.6g}" if 1e-300 < abs(float(text)) < 1e300 else text
 
 
 _MOST_DISTINCT = 40
@@ -375,7 +377,7 @@ def _nearest_double(value: Fraction) -> float:
 
 def _out_of_range(value: Fraction, precision: Precision) -> InputError:
     return InputError(
-        f"{decimal_text(value, 6)} is outside the exponent range of {precision.name}.",
+        f"{six_digits(value)} is outside the exponent range of {precision.name}.",
         "Choose other units, or a format with a wider range such as real:237.",
     )
 
@@ -596,7 +598,7 @@ def vector(values: Iterable[Any], what: str) -> Vector:
     """Three exact rationals of components that :func:`exact` reads; raises InputError otherwise."""
     parts = ordered(values, what, "Give three numbers: x,y,z.")
     if len(parts) != 3:
-        raise InputError(f"{argument(what)} has {len(parts)} numbers.", "Give three: x,y,z.")
+        raise InputError(f"{argument(what)} must have 3 numbers; got {len(parts)}.", "Give x,y,z.")
     try:
         first, second, third = (exact(part) for part in parts)
     except InputError as error:

@@ -36,9 +36,9 @@ def test_it_is_in_the_axes_of_the_body_and_of_the_run_with_its_attitude() -> Non
 @pytest.mark.parametrize(
     ("time", "integrator", "words"),
     [
-        (4.1, "heyoka", "is not in the run"),
-        (-1, "heyoka", "is not in"),
-        (1, "scipy:DOP853", "hands over no polynomial"),
+        (4.1, "heyoka", "is outside the run"),
+        (-1, "heyoka", "outside the run"),
+        (1, "scipy:DOP853", "has no dense output"),
     ],
 )
 def test_it_says_where_it_is_not_defined(time: float, integrator: str, words: str) -> None:
@@ -58,7 +58,7 @@ def test_attitudes_go_to_scipy_and_back(monkeypatch: pytest.MonkeyPatch) -> None
     assert np.abs(rotations.as_matrix() - run.matrices()).max() < 1e-15
     start = ht.State(omega=(1, 2, 3), attitude=ht.Attitude.rotation(rotations[1]))
     assert np.abs(ht.propagate(BODY, start, [0, 1]).matrices()[0] - run.matrices()[1]).max() < 1e-15
-    with pytest.raises(ht.InputError, match="not a single Rotation"):
+    with pytest.raises(ht.InputError, match="must be a single Rotation"):
         ht.Attitude.rotation(rotations)
     monkeypatch.setitem(sys.modules, "scipy.spatial.transform", None)
     with pytest.raises(ht.InputError, match=r"Rotations need SciPy.\s+Install it"):

@@ -205,7 +205,7 @@ def test_an_error_below_what_a_float_holds_is_not_printed_as_0() -> None:
 
 
 def test_an_ensemble_of_a_peer_is_refused_as_one_motion_at_a_time() -> None:
-    with pytest.raises(ht.InputError, match="splitting:4 runs one motion at a time"):
+    with pytest.raises(ht.InputError, match="splitting:4 does not support ensembles"):
         ht.ensemble(TOP, START, [1], integrator="splitting:4")
 
 

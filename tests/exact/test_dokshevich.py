@@ -138,7 +138,7 @@ def test_moments_on_the_edge_of_what_a_body_has_are_no_harder():
 
 
 def test_moments_that_no_body_has_may_be_too_far_apart_and_the_refusal_names_the_level():
-    with pytest.raises(OutOfReach, match="degenerate but for"):
+    with pytest.raises(OutOfReach, match="degenerate to within"):
         dokshevich_motion((1, F(1, 10**10), F(1, 10**20))).state(F(1), 170)
 
 
@@ -182,7 +182,7 @@ def test_every_hess_top_has_one_with_an_algebraic_start(data):
     ("inertia", "place", "what"),
     [
         (("nan", 1, 2), F(1, 2), "inertia"),
-        ((8, 6), F(1, 2), "inertia has 2"),
+        ((8, 6), F(1, 2), "inertia must have 3"),
         ("863", F(1, 2), "inertia"),
         ((8, 6, 3), "nan", "place"),
         ((8, 6, 3), float("inf"), "place"),

@@ -123,9 +123,9 @@ def test_nearer_theta_functions_take_over(level, exponent):
 
 @pytest.mark.parametrize("level", ["asymptotic", "both"])
 def test_nearer_still_the_motion_is_refused_with_the_distance(level):
-    with pytest.raises(NotInClass, match=r"but for .*e-12, the distance"):
+    with pytest.raises(NotInClass, match=r"to within .*e-12, the distance"):
         motion_from((F(1), F(0)), NEAR[level], tilted(12))
-    with pytest.raises(NotInClass, match=r"but for .*e-200, the distance"):
+    with pytest.raises(NotInClass, match=r"to within .*e-200, the distance"):
         motion_from((F(1), F(0)), NEAR[level], tilted(200))
 
 

@@ -37,7 +37,7 @@ AT_IMPORT = {
     "raise Mute": "is broken: Mute",
     "def (:": "is broken: SyntaxError",
     "import not_there_at_all": "is broken: ModuleNotFoundError: No module named 'not_there_at_all'",
-    "solver = right": "has no solve",
+    "solver = right": "does not define solve",
     "solve = 7": "is a int, not a function",
     "class solve: pass": "is a type, not a function",
     "def solve(a, b): return right(a)": "takes 2 arguments",

@@ -170,7 +170,7 @@ def test_a_program_is_given_k_and_one_that_declares_the_heavy_top_alone_is_asked
     assert "rotor 0.5 -0.33333333333333331 0.75" in lines
     file = tmp_path / "mine.toml"
     file.write_text('[[integrator]]\nname = "mine"\ncommand = ["true"]\n')
-    with pytest.raises(ht.HeavyTopError, match="cannot do the system heavy_gyrostat"):
+    with pytest.raises(ht.HeavyTopError, match="does not support the system heavy_gyrostat"):
         ht.propagate(CASE.top, CASE.start, [1], integrator=str(file))
 
 

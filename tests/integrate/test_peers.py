@@ -96,9 +96,9 @@ def test_the_tolerance_in_force_is_the_one_recorded(monkeypatch: pytest.MonkeyPa
 @pytest.mark.parametrize(
     ("name", "control", "size", "message"),
     [
-        ("heyoka", "step", FINE, "heyoka has no step"),
-        ("splitting:2", "tolerance", FINE, "has no tolerance"),
-        ("scipy:LSODA", "tolerance", Fraction(0), "between 0 and 1"),
+        ("heyoka", "step", FINE, "heyoka does not support step"),
+        ("splitting:2", "tolerance", FINE, "does not support tolerance"),
+        ("scipy:LSODA", "tolerance", Fraction(0), "above 0, up to 1"),
     ],
 )
 def test_what_does_not_control_a_peer_is_refused(name: str, control: str, size: Fraction, message: str) -> None:

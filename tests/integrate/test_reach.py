@@ -43,7 +43,7 @@ def test_what_counts_is_time_by_rate_in_any_unit(name: str, decades: int) -> Non
     assert 0.3 < float(square_of_rate(problem.system, problem.parameters, problem.start.flat) / rate**2) < 3
     for direction in (1, -1):
         require_reach(problem, direction * far / 2)
-        with pytest.raises(ht.OutOfReach, match=r"takes some 1e12 steps"):
+        with pytest.raises(ht.OutOfReach, match=r"takes about 1e12 steps"):
             require_reach(problem, direction * far * 4)
 
 
@@ -77,7 +77,7 @@ def test_a_gyrostat_is_not_driven_by_its_weight_but_by_its_rotor() -> None:
 
 @pytest.mark.parametrize("name", ["heyoka", "multiword", "splitting:4", "mpmath:odefun"])
 def test_every_integrator_is_refused_from_python(name: str) -> None:
-    with pytest.raises(ht.OutOfReach, match="takes some 1e16 steps"):
+    with pytest.raises(ht.OutOfReach, match="takes about 1e16 steps"):
         ht.propagate(TOP, START, [1, "2e16"], integrator=name)
     if INTEGRATORS[name].streams:
         with pytest.raises(ht.OutOfReach):

@@ -46,10 +46,10 @@ def test_it_goes_back_and_carries_the_attitude() -> None:
 @pytest.mark.parametrize(
     ("a", "b", "cause"),
     [
-        ((), (), "add up to 0"),
-        (((1,),), (1,), r"lengths \[1\]"),
-        (((F(1, 2),), (1,)), (0, 0, 1), r"lengths \[1, 1\]"),
-        (((F(1, 2),),), (0, F(99, 100)), "add up to 0.99"),
+        ((), (), "sum to 1; got 0"),
+        (((1,),), (1,), r"lengths: \[1\]"),
+        (((F(1, 2),), (1,)), (0, 0, 1), r"lengths: \[1, 1\]"),
+        (((F(1, 2),),), (0, F(99, 100)), "sum to 1; got 0.99"),
     ],
 )
 def test_coefficients_that_are_no_method_are_refused(a: tuple, b: tuple, cause: str) -> None:

@@ -229,7 +229,7 @@ def test_outputs_are_right_from_any_thread(known: Reference) -> None:
         ("euler:ABC", {}, "Unknown sequence"),
         ("matrix:ZXZ", {}, "Unknown output"),
         ("", {}, "Unknown output"),
-        ("position", {"point": (1, 2)}, "point has 2 numbers"),
+        ("position", {"point": (1, 2)}, "point must have 3 numbers; got 2"),
         ("position", {"point": (1, 2, "nan")}, "not a finite number"),
         ("position", {"pivot": (1, 2, "1e400")}, "too large"),
         ("matrix", {"point": (1, 2, 3)}, "no point"),

@@ -28,7 +28,7 @@ def test_moments_that_are_not_positive_are_refused(inertia) -> None:
 def test_a_vector_has_three_numbers(values) -> None:
     with pytest.raises(InputError, match="numbers"):
         HeavyTop(values, 1, (0, 0, 1))
-    with pytest.raises(InputError, match="omega has"):
+    with pytest.raises(InputError, match="omega must have 3 numbers"):
         State(values, (0, 0, 1))
 
 

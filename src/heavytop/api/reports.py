@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from heavytop import arguments, records
 from heavytop.api.run_folder import prepare
 from heavytop.arguments import Number
-from heavytop.display import Tabular, TitledTable, printable
+from heavytop.display import Tabular, TitledTable, plural, printable
 from heavytop.errors import InputError, quoted
 from heavytop.features.kinds import KINDS
 from heavytop.measure.scalar import digits_kept
@@ -77,7 +77,7 @@ class Report(Tabular, records.Report, frozen=True):
 
     def _table(self) -> TitledTable:
         count = sum(failed(row, KINDS) for row in self.rows)
-        title = f"Report of plan {self.plan.get('name', '')}: {len(self.rows)} rows, {self.verdict}"
+        title = f"Report of plan {self.plan.get('name', '')}: {plural(len(self.rows), 'row')}, {self.verdict}"
         if count:
             title += f" ({count} failed)"
         body = []
@@ -150,7 +150,7 @@ class History(Tabular):
     def _table(self) -> TitledTable:
         heads = ("row", "metric", *(str(number) for number in range(1, len(self.names) + 1)))
         notes = [printable(f"{number}  {name}") for number, name in enumerate(self.names, 1)]
-        title = f"{len(self.tracks)} metrics over {len(self.names)} reports"
+        title = f"{plural(len(self.tracks), 'metric')} over {len(self.names)} reports"
         return TitledTable(title, heads, [list(map(printable, over.cells(track))) for track in self.tracks], notes)
 
 

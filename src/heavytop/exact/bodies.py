@@ -149,7 +149,7 @@ def _turned(known: tuple[Resolved, ExactSolution], bits: int, evaluate: Evaluate
         if reached >= bits:
             return values
         working += bits - reached + 4
-    raise OutOfReach(f"Only {reached} of {bits} bits could be proven in the axes given.", "Ask for fewer digits.")
+    raise OutOfReach(f"Only {reached} of {bits} bits could be proven in the axes given.", "Request fewer digits.")
 
 
 @whole_evaluation

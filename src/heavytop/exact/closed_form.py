@@ -511,7 +511,7 @@ class Renamed:
         """The state by the solution's second closed form.  Raises OutOfReach where it has none."""
         second = getattr(self.solution, "second_state", None)
         if second is None:
-            raise OutOfReach("There is one closed form of this motion only.", "Certify it by the enclosure.")
+            raise OutOfReach("This motion has only one closed form.", "Certify it by the enclosure.")
         return self._renamed(second(time, bits))
 
     def attitude(self, time: Fraction, bits: int) -> list[arb]:
@@ -525,5 +525,7 @@ class Renamed:
         """ξ of the solution in the new names.  Raises NotInClass where it has no attitude."""
         attitude = getattr(self.solution, "attitude", None)
         if attitude is None:
-            raise NotInClass(f"{self.method} has no attitude in closed form.", "Integrate the attitude along with it.")
+            raise NotInClass(
+                f"{self.method} has no attitude in closed form.", "Integrate the attitude with the motion."
+            )
         return permuted(attitude(time, bits), self.axes)

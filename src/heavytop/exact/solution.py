@@ -110,7 +110,7 @@ def require(name: str, conditions: Iterable[ExactRelation], top: HeavyTop, start
         if not condition.holds(top, start):
             raise NotInClass(
                 f"{name} needs {condition.text}, but {condition.named_values(top, start)}.",
-                "Rename the axes if need be; `heavytop.reference` finds the class of a motion by itself.",
+                "Rename the axes if need be; `heavytop.reference` determines the class of a motion.",
             )
 
 

@@ -172,7 +172,7 @@ def ensemble_of(case: Case, count: int, seed: int) -> list[Member]:
     """
     if one_motion(case, seed):
         if count > FACTORS:
-            raise InputError(f"{count} starts of {case.name}, which is one motion.", f"Give up to {FACTORS}.")
+            raise InputError(f"The starts of {case.name} must be at most {FACTORS}; got {count}.", "Give fewer.")
         return [(scaled(case.top, factor(_SEED_STRIDE * seed, index)), case.start) for index in range(count)]
     return [(case.top, _draw(case, seed, index)) for index in range(count)]
 

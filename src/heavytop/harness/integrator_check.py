@@ -24,7 +24,19 @@ from heavytop.integrate.peers.command import Command, ProgramRequest, Session, b
 from heavytop.integrate.peers.contract import Declared, said
 from heavytop.integrate.registry import IntegratorSource, described
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.precision import DOUBLE, Precision, Vector, decimal_text, exact, parse, real, round_to, rounded, vector
+from heavytop.precision import (
+    DOUBLE,
+    Precision,
+    Vector,
+    decimal_text,
+    exact,
+    parse,
+    real,
+    round_to,
+    rounded,
+    six_digits,
+    vector,
+)
 from heavytop.processes import GuardedProcess
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
@@ -223,7 +235,7 @@ class _Contract:
         problem = (top or self.top, start or self.start, instants, precision or self.precision)
         run = registry.ready(self.which)(*problem, system=system or self.system, **more)
         if run.outcome is not Outcome.SUCCESS:
-            raise _Violated(f"It ends as {run.outcome.value} at t = {decimal_text(run.time_reached, 6)}.")
+            raise _Violated(f"It ends as {run.outcome.value} at t = {six_digits(run.time_reached)}.")
         return run
 
     def _starts(self) -> str:
@@ -387,7 +399,7 @@ class _Contract:
             error = _distance(state, expected)
             if error > _LARGEST_ERROR:
                 raise _Violated(
-                    f"With the attitude its state at t = {decimal_text(time, 6)} is off by {decimal_text(error, 2)}."
+                    f"With the attitude its state at t = {six_digits(time)} is off by {decimal_text(error, 2)}."
                 )
         return "It carries the attitude."
 

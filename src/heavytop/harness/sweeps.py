@@ -190,7 +190,7 @@ def _text(value: Fraction | Sequence[Fraction]) -> str:
 
 def _bounded(name: str, size: int) -> int:
     if not 1 <= size <= _MOST:
-        raise InputError(f"The sweep {name} has {size} tops.", f"Give it 1 to {_MOST}.")
+        raise InputError(f"The sweep {name} must have 1 to {_MOST} tops; got {size}.", "Change its number of tops.")
     return size
 
 

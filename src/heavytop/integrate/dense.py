@@ -30,7 +30,7 @@ from heavytop.integrate.registry import expected_steps, name_of
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.multiword.double_double.double_double_run import Floating
 from heavytop.multiword.problem import ResumableRun, Scaled, Status
-from heavytop.precision import DOUBLE, decimal_text, exact, number, rounded
+from heavytop.precision import DOUBLE, exact, number, rounded, six_digits
 
 _SPARE_BITS = 64
 MOST_STEPS = 10**8
@@ -243,15 +243,15 @@ def dense(
     if steps_of is None:
         name = said(name_of(integrator))
         raise Unsupported(
-            f"The integrator {name} hands over no polynomial of its steps, for events or states between samples.",
+            f"The integrator {name} has no dense output, which events and states between samples need.",
             f"Use {' or '.join(_DENSE)}.",
         )
     end = rounded(until, problem.precision)
     steps = expected_steps(problem, end)
     if steps > MOST_STEPS and not (step_limit is not None and step_limit <= MOST_STEPS):
         raise OutOfReach(
-            f"A run to t = {decimal_text(end, 6)} takes some {steps:.0e} steps, and each is kept or looked at.",
-            f"Up to {MOST_STEPS:.0e} are tried: ask for an earlier time, or give a step limit.",
+            f"A run to t = {six_digits(end)} takes about {steps:.0e} steps, too many for dense output.",
+            f"At most {MOST_STEPS:.0e} are supported: give an earlier time, or a step limit.",
         )
     return Dense(steps_of, problem, end, tolerance, step_limit)
 
@@ -279,7 +279,7 @@ class DenseOutput:
         run, pieces = self._steps
         sign, end = (1 if run.until > 0 else -1), run.reached
         if not 0 <= sign * time <= abs(end):
-            raise InputError(f"t = {decimal_text(time, 6)} is not in the run.", f"Give 0 to {decimal_text(end, 6)}.")
+            raise InputError(f"t = {six_digits(time)} is outside the run.", f"Give a time from 0 to {six_digits(end)}.")
         problem = run.problem
         if not time or not pieces:
             return self.axes([*problem.native(problem.start.flat)])

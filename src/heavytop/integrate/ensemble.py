@@ -53,7 +53,7 @@ def propagate_ensemble(
     """
     first, work = work_of(problems, times, step_limit, observer)
     if lanes < 2:
-        raise InputError(f"{lanes} lanes make no ensemble.", "Use 2 lanes or more.")
+        raise InputError(f"lanes must be at least 2; got {lanes}.", "Use 2 lanes or more.")
     batch = first.precision == DOUBLE and work.moves
     width = lanes if batch else None
     tool = compiled(first.system, first.precision, attitude=first.xi is not None, lanes=width, **options)
@@ -87,7 +87,7 @@ def in_threads(
     """
     threads = processors() if threads is None else threads
     if threads < 1:
-        raise InputError(f"{threads} threads make no ensemble.", "Use 1 thread or more.")
+        raise InputError(f"threads must be at least 1; got {threads}.", "Use 1 thread or more.")
     threads = min(threads, -(-len(work.pending) // width))
     done: dict[int, Trajectory] = {}
     error_state = numpy.geterr()
@@ -150,7 +150,7 @@ def _one_by_one(work: Work, tool: Compiled) -> None:
 def one_kind(problems: Sequence[Problem]) -> Problem:
     """The first problem; raises InputError unless all are of its kind."""
     if not problems:
-        raise InputError("An ensemble of no problems.", "Give one or more.")
+        raise InputError("An ensemble needs at least one problem.", "Give one or more.")
 
     def kind(problem: Problem) -> str:
         attitude = "without" if problem.xi is None else "with"
@@ -159,6 +159,6 @@ def one_kind(problems: Sequence[Problem]) -> Problem:
     for index, problem in enumerate(problems):
         if kind(problem) != kind(problems[0]):
             raise InputError(
-                f"Problem 0 is {kind(problems[0])}, problem {index} is {kind(problem)}.", "Run each kind by itself."
+                f"Problem 0 is {kind(problems[0])}, problem {index} is {kind(problem)}.", "Run each kind separately."
             )
     return problems[0]

@@ -46,11 +46,11 @@ from heavytop.precision import (
     OrderedRing,
     Precision,
     cache_last_call,
-    decimal_text,
     exact,
     log10,
     parse,
     physical,
+    six_digits,
 )
 from heavytop.records import INTEGRATORS as FORMER
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, SYSTEMS, System, square_of_rate, system
@@ -225,7 +225,7 @@ class Integrator:
         Raises PeerFailed for whatever a third-party integrator does wrong.
         """
         if self.streams and self.set_to:
-            raise Unsupported(f"{self.name} has no {self.set_to[0]}.", "Name an integrator that has.")
+            raise Unsupported(f"{self.name} does not support a {self.set_to[0]}.", "Choose an integrator that does.")
         if self.streams:
             call = propagator(self, {})
             run: Trajectory = call(top, start, times, precision, system=system, xi=xi, observer=observer, **resume)
@@ -268,7 +268,7 @@ class Integrator:
             controlled = replace(self, set_to=("tolerance", options["tolerance"]))
             return controlled.propagate_many(problems, times, observer, finished, threads)
         if options:
-            raise PeerFailed(f"The integrator {self.name} has no {', '.join(options)}")
+            raise PeerFailed(f"The integrator {self.name} does not support {', '.join(options)}")
         runs = []
         for index, problem in enumerate(problems):
             watch = None if observer is None else partial(observer, index)
@@ -380,7 +380,7 @@ def named(integrator: Any, folder: Path | None = None) -> str | IntegratorSource
     commands = [command for command in commands_in(path) if wanted in (None, command.name)]
     if len(commands) != 1:
         known = ", ".join(command.name for command in commands_in(path))
-        raise InputError(f"{integrator} is not one integrator: {path.name} has {known}.", f"Give {match[1]}:NAME.")
+        raise InputError(f"{integrator} is ambiguous: {path.name} defines {known}.", f"Give {match[1]}:NAME.")
     return commands[0]
 
 
@@ -405,10 +405,10 @@ def commands_in(path: Path) -> list[Command]:
         raise InputError(f"{path} is not valid: {error}.", _SHOWN) from None
     tables = document.get("integrator")
     if document.keys() - {"integrator"} or not isinstance(tables, list) or not tables:
-        raise InputError(f"{path} does not hold [[integrator]] tables alone.", _SHOWN)
+        raise InputError(f"{path} must contain [[integrator]] tables only.", _SHOWN)
     commands = [command_of(table, path.parent, str(path)) for table in tables]
     if len({command.name for command in commands}) < len(commands):
-        raise InputError(f"{path} gives one name to two integrators.", "Give each a name of its own.")
+        raise InputError(f"{path} gives two integrators the same name.", "Give each a different name.")
     return commands
 
 
@@ -439,7 +439,7 @@ def _require_possible(command: Command) -> None:
     if not 0 < exact(str(command.timeout)) <= _MOST_SECONDS:
         raise InputError(f"timeout = {quoted(command.timeout)} is not above 0 and up to {_MOST_SECONDS} seconds.")
     if command.order < 0:
-        raise InputError(f"order = {command.order} is below 0.")
+        raise InputError(f"order must not be negative; got {command.order}.")
     for name, values in (("systems", command.declared.systems), ("directions", command.directions)):
         if not values:
             raise InputError(f"{name} is empty.")
@@ -456,7 +456,10 @@ def seconds_of(value: Any, what: str) -> float:
     """A time limit in seconds; raises InputError unless it is above 0."""
     seconds = physical(value, what)
     if not 0 < seconds <= _MOST_SECONDS:
-        raise InputError(f"{what} = {quoted(value)} is not a time limit.", f"Give seconds, up to {_MOST_SECONDS}.")
+        raise InputError(
+            f"{what} must be positive and at most {_MOST_SECONDS} seconds; got {quoted(value)}.",
+            "Give seconds, such as 60.",
+        )
     return float(seconds)
 
 
@@ -529,7 +532,7 @@ def ready(which: str | IntegratorSource, control: tuple[str, Fraction] | None = 
             if option not in arguments and not takes_any and own:
                 raise no_option(name, option)
             if option not in arguments and not takes_any:
-                raise PeerFailed(f"{name} has no {option}")
+                raise PeerFailed(f"{name} does not support {option}")
         if "step_limit" in arguments and not own:
             options["step_limit"] = STEP_LIMIT
     return CheckedPlugin(name, chosen, own, declared, options)
@@ -538,7 +541,7 @@ def ready(which: str | IntegratorSource, control: tuple[str, Fraction] | None = 
 def _program(command: Command, control: tuple[str, Fraction] | None) -> Peer:
     """The program with that control; one that says that it failed raises PeerFailed with what it said."""
     if control is not None and control[0] != command.control:
-        raise PeerFailed(f"{command.name} has no {control[0]}")
+        raise PeerFailed(f"{command.name} does not support {control[0]}")
     integrate = partial(command.load(), **dict([control] if control else []))
 
     def call(*arguments: Any, **options: Any) -> Trajectory:
@@ -651,9 +654,8 @@ def require_reach(
     steps = expected_steps(problem, end, step)
     if steps > MOST_STEPS:
         raise OutOfReach(
-            f"A run to t = {decimal_text(end, 6)} takes some 1e{math.floor(log10(Fraction(steps)) or 0.0)} steps.",
-            f"Up to {MOST_STEPS:.0e} are tried: ask for an earlier time, or for a proven state, which needs no steps "
-            "where there is a closed form (`heavytop reference`).",
+            f"A run to t = {six_digits(end)} takes about 1e{math.floor(log10(Fraction(steps)) or 0.0)} steps.",
+            f"At most {MOST_STEPS:.0e} are supported: give an earlier time, or use `heavytop reference`.",
         )
 
 
@@ -723,7 +725,9 @@ def ensemble_propagator(which: str | IntegratorSource, options: dict[str, Any]) 
     integrator = described(which)
     if not integrator.ensemble:
         require(integrator)
-        raise InputError(f"The integrator {integrator.name} runs one motion at a time.", "Call propagate for each.")
+        raise InputError(
+            f"The integrator {integrator.name} does not support ensembles.", "Call propagate for each motion."
+        )
     _with(loaded(integrator.function), integrator.name, dict.fromkeys(options.keys() - {"threads"}))  # refuses unknown
     run = _with(loaded(integrator.ensemble), integrator.name, options)
 
@@ -752,7 +756,7 @@ def no_option(name: str, option: str) -> InputError:
     else:
         streaming = [other.name for other in INTEGRATORS.values() if other.streams]
         remedy = f"Leave it out, or use {' or '.join(streaming) if option == 'step_limit' else 'another integrator'}."
-    return InputError(f"The integrator {name} has no {argument(option)}.", remedy)
+    return InputError(f"The integrator {name} does not support {argument(option)}.", remedy)
 
 
 def _with(function: Callable[..., Any], name: str, options: dict[str, Any]) -> Callable[..., Any]:

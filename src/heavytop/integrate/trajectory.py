@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy
 from numpy.typing import NDArray
 
-from heavytop.display import LazyLines, Tabular, TitledTable, path_picture
+from heavytop.display import LazyLines, Tabular, TitledTable, path_picture, plural
 from heavytop.errors import InputError
 from heavytop.precision import (
     DOUBLE,
@@ -30,6 +30,7 @@ from heavytop.precision import (
     native_text,
     number,
     rounded,
+    six_digits,
 )
 from heavytop.top.attitude import (
     Output,
@@ -94,7 +95,7 @@ def attitude_of(run: Trajectory) -> Any:
     if run.problem.xi is None:
         raise InputError(
             "The attitude was not computed: gamma alone does not fix it.",
-            "Give attitude=True (`heavytop docs outputs` says where the rotation about the vertical starts), or xi.",
+            "Give attitude=True (`heavytop docs outputs` defines xi at t = 0), or xi.",
         )
     return run.attitude if run.attitude is not None else run.states[:, 6:9]
 
@@ -116,7 +117,7 @@ def _centre(run: Trajectory, output: Output) -> Vector:
     if run.problem.given is not None:
         return run.problem.given[0].centre
     if output.name == "position" and output.point is None:
-        raise InputError("This run does not say where its centre of mass is.", "Give a point.")
+        raise InputError("This run does not contain its centre of mass.", "Give a point.")
     return run.problem.top.centre
 
 
@@ -302,10 +303,10 @@ class ResumePoint:
         different = [name for name in names if self.flags.get(name) != flags.get(name)]
         if different:
             raise OtherFlags(
-                "The run that is to go on was integrated with "
+                "The run to be resumed was integrated with "
                 + ", ".join(f"{name} = {self.flags.get(name)} (now {flags.get(name)})" for name in different)
                 + ".",
-                "Go on with the program and machine that began it, or start anew in another folder.",
+                "Resume with the same program and machine, or start a new run in another folder.",
             )
 
     def content(self, precision: Precision) -> dict[str, Any]:
@@ -457,7 +458,7 @@ class Trajectory(Tabular, InSpace):
         Raises InputError for a run that was not asked for angles.
         """
         if self.angle_texts is None:
-            raise InputError("The angles were not followed.", "Propagate with angles=True; euler() needs no following.")
+            raise InputError("The Euler angles were not propagated.", "Propagate with angles=True, or use euler().")
         return numpy.array(self.angle_texts, dtype=float).reshape(-1, 3)
 
     def _in_double(self, what: Output) -> NDArray[numpy.float64]:
@@ -470,7 +471,7 @@ class Trajectory(Tabular, InSpace):
         Raises InputError for a time outside of the run, Unsupported for an integrator that hands over no polynomials.
         """
         if self.dense is None:
-            raise InputError("This run has no dense output.", "Take that of heavytop.propagate.")
+            raise InputError("This run has no dense output.", "Use a run of heavytop.propagate.")
         several = numpy.ndim(t) > 0
         states = numpy.array([self.dense(exact(time)) for time in (t if several else [t])])
         return states.reshape(-1, 6).T if several else states[0]
@@ -527,8 +528,8 @@ class Trajectory(Tabular, InSpace):
         (lost, followed), precision = self.digits_lost, self.problem.precision
         if lost < _FEW_DIGITS:
             return ""
-        digits, until = round(precision.bits * math.log10(2)), decimal_text(self.time_reached, 6)
-        state = f"the motion itself amplifies roundings: a state rounded to {precision.name} on the way has lost"
+        digits, until = round(precision.bits * math.log10(2)), six_digits(self.time_reached)
+        state = f"the motion itself amplifies rounding errors: a state rounded to {precision.name} on the way has lost"
         if lost >= (precision.bits + _BEYOND) * math.log10(2):
             return f"{state} all {digits} digits before t = {until}"
         return (
@@ -553,16 +554,16 @@ class Trajectory(Tabular, InSpace):
             return [decimal_text(self.times[index], _SHOWN), *(_shown(value, digits) for value in self.states[index])]
 
         rows = LazyLines(min(len(self.times), len(self.states)), line)
-        steps = f"{self.steps} steps" + (f" of order {self.order}" if self.order else "")
+        steps = plural(self.steps, "step") + (f" of order {self.order}" if self.order else "")
         title = f"{self.problem.system.name} in {precision.name} by {self.integrator}: {self.outcome.message}, {steps}"
         names = NAMES if self.problem.xi is None or self.attitude is not None else (*NAMES, "ξ1", "ξ2", "ξ3")
         notes = []
         if rows and precision != DOUBLE:
             notes.append(f"shown to {digits} digits; texts() gives all")
         if self.times and not rows:
-            notes.append(f"{len(self.times)} states went to the observer")
+            notes.append(f"{len(self.times)} states were passed to the observer")
         if self.outcome is not Outcome.SUCCESS:
-            notes.append(f"reached t = {decimal_text(self.time_reached, 6)} only")
+            notes.append(f"reached t = {six_digits(self.time_reached)} only")
         if (steady := self.stability) is not None:
             notes.append(steady.text(precision.bits))
         if lost := self.amplification_text():

@@ -159,7 +159,7 @@ def _require_overlap(
         gap = abs(midpoint(a) - midpoint(b))
         if gap > radius(a) + radius(b):
             raise Contradiction(
-                f"{solution.method} and {source} exclude each other at t = {float(time):.6g}: component "
+                f"{solution.method} and {source} contradict each other at t = {float(time):.6g}: component "
                 f"{component} differs at digit {_digits(gap)}.",
                 "One of them is wrong: neither can serve as a reference.",
             )

@@ -48,7 +48,7 @@ class Ball(msgspec.Struct, frozen=True):
         if exact(printed.radius) > Fraction(1, 10**digits) * max(Fraction(1), abs(exact(printed.value))):
             raise OutOfReach(
                 f"{name} at t = {shown(time)} is known within {printed.radius} only, not to {digits} digits{source}.",
-                "Ask for fewer digits.",
+                "Request fewer digits.",
             )
         return printed
 
@@ -80,7 +80,9 @@ def which_derivatives(value: object) -> str | None:
     """ "start", "data", "all", or None for none; raises InputError for any other."""
     if value is None or (isinstance(value, str) and value in WHICH):
         return value
-    raise InputError(f"derivatives must be known; got {quoted(value)}.", 'Give "start", "data" or "all".')
+    raise InputError(
+        f'derivatives must be "start", "data" or "all"; got {quoted(value)}.', "Give one of these, or None."
+    )
 
 
 def known_derivatives(

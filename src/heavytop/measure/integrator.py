@@ -26,7 +26,7 @@ from heavytop.measure.running import TimeText
 from heavytop.measure.scalar import RELATIVE, UNRESOLVED, of_fraction
 from heavytop.measure.scorer import SOLUTION_ERROR, Scorer
 from heavytop.measure.truth import EnsembleReference
-from heavytop.precision import Array, decimal_text, exact
+from heavytop.precision import Array, decimal_text, exact, six_digits
 from heavytop.records import UNRESOLVED_SECONDS, Law, Metric, Quantity, Series
 from heavytop.top.heavy_top import State
 
@@ -169,8 +169,8 @@ def _require_near(name: str, run: Trajectory, judged: Trajectory, most: Fraction
         raise PeerFailed(f"{name} ended as {run.outcome.value} {what}, and as success asked for {count} times")
     if most is not None and (off := _distance(run, judged)) > most:
         raise PeerFailed(
-            f"{name}, {what}, ended {decimal_text(off, 2)} away from where it ended asked for {count} times, "
-            f"which its error explains up to {decimal_text(most, 2)}: the seconds are those of another run"
+            f"{name}, {what}, ends {decimal_text(off, 2)} away from its run with {count} times, of which its error "
+            f"explains up to {decimal_text(most, 2)}: the seconds are those of another run"
         )
 
 
@@ -217,7 +217,7 @@ def require_counts(name: str, run: Trajectory, control: tuple[str, Fraction] | N
         raise PeerFailed(f"{name} counts its steps wrongly: it moved, and says that it took no step")
     if control is not None and control[0] == "step" and 0 < 2 * run.steps < span / control[1]:
         raise PeerFailed(
-            f"{name} counts its steps wrongly: {run.steps} over {decimal_text(span, 6)}, where each is "
+            f"{name} counts its steps wrongly: {run.steps} over {six_digits(span)}, where each is "
             f"{decimal_text(control[1], 3)}"
         )
 

@@ -148,7 +148,7 @@ class KnownMotion:
         raise OutOfReach(
             f"The {output.name} at t = {shown(self.times[index])} is not known to {self.digits} digits, by "
             f"{self.method}.",
-            "Ask for fewer digits.",
+            "Request fewer digits.",
         )
 
     @whole_evaluation
@@ -342,7 +342,7 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
             if self.attitude is None or self.centre is None or self.gamma is None or self.xi is None:
                 raise InputError(
                     "The attitude was not computed: gamma alone does not fix it.",
-                    "Give attitude=True: xi then starts where `heavytop docs outputs` says.",
+                    "Give attitude=True (`heavytop docs outputs` defines xi at t = 0), or xi.",
                 )
             start = self.centre, self.gamma, self.xi
             motion = as_written(self.states, self.attitude, self.times, self.digits, *start)
@@ -378,13 +378,13 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
         exponents = self._derivatives().lyapunov
         if exponents is None:
             raise InputError(
-                "This reference has no derivatives with respect to the start.", 'Ask for derivatives="start" or "all".'
+                "This reference has no derivatives with respect to the start.", 'Give derivatives="start" or "all".'
             )
         return exponents
 
     def _derivatives(self) -> Derivatives:
         if self.derivatives is None:
-            raise InputError("This reference has no derivatives.", 'Ask for derivatives="start", "data" or "all".')
+            raise InputError("This reference has no derivatives.", 'Give derivatives="start", "data" or "all".')
         return self.derivatives
 
     def _table(self) -> TitledTable:

@@ -28,7 +28,7 @@ from heavytop.exact.solution import ExactSolution
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.certify import EXACTLY, Certificate, certify, enclosure_of
 from heavytop.measure.scalar import GUARD_BITS, largest, to_balls
-from heavytop.precision import Precision, Vector, decimal_text, number, real, shown, time_text
+from heavytop.precision import Precision, Vector, decimal_text, number, real, shown, six_digits, time_text
 from heavytop.records import Against, Certified
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import check_times
@@ -236,9 +236,9 @@ def _states(served: Sequence[_WithArithmetic], times: Sequence[Fraction], effort
         reached = min(abs(run.time_reached) for run in runs if run.outcome is Outcome.STEP_LIMIT)
         if abs(times[-1]) * _PILOT_STEPS > limit * reached:
             raise OutOfReach(
-                f"A reference run in words of {words} bits to t = {decimal_text(times[-1], 6)} takes too long: its "
+                f"A reference run in words of {words} bits to t = {six_digits(times[-1])} takes too long: its "
                 f"first {_PILOT_STEPS} steps end at t = {decimal_text(reached, 3)}.",
-                "Ask for an earlier time.",
+                "Give an earlier time.",
             )
         done = min(map(len, states))
         runs = _trajectories(problems, times[done:], limit)
@@ -246,7 +246,7 @@ def _states(served: Sequence[_WithArithmetic], times: Sequence[Fraction], effort
     for run in runs:
         if run.outcome is not Outcome.SUCCESS:
             raise OutOfReach(
-                f"A reference run in words of {words} bits {run.outcome.message}.", "Ask for an earlier time."
+                f"A reference run in words of {words} bits {run.outcome.message}.", "Give an earlier time."
             )
     return states
 
@@ -379,7 +379,7 @@ def _computed(problem: Problem, times: Sequence[Fraction], effort: float | None 
     except (InputError, OutOfReach) as error:
         return clause(error)
     if computed.ends == times[0]:
-        return f"all significant digits of the format are lost at t = {time_text(computed.ends)}, the first sample"
+        return f"all significant digits of the format are lost at the first sample, t = {time_text(computed.ends)}"
     return Truth(computed.against, computed.state, computed.ends)
 
 

@@ -214,7 +214,7 @@ class _Numbers:
         return value in ("true", "1")
 
     def some(self, text: str | None, what: str, count: int, default: str | None = None) -> list[Fraction]:
-        """So many numbers."""
+        """``count`` numbers."""
         values = self.read(text, what, default)
         if len(values) != count:
             raise InputError(f"{self.where}: {what} must have {count} numbers; got {len(values)}.", f"Give {count}.")
@@ -660,9 +660,7 @@ class _MjcfFrames:
         if len(keys) > 1:
             raise InputError(f"{numbers.where}: {' and '.join(keys)} were given.", "Give one orientation.")
         key = keys[0] if keys else "euler"
-        values = numbers.read(frame.get(key), key, "0 0 0")
-        if len(values) != _ORIENTATIONS[key]:
-            raise InputError(f"{numbers.where}: {key} has {len(values)} numbers.", f"Give {_ORIENTATIONS[key]}.")
+        values = numbers.some(frame.get(key), key, _ORIENTATIONS[key], "0 0 0")
         unit = "" if self.settings.get("angle") == "radian" else "deg"
         if key == "quat":
             return _turn(*values)
@@ -742,17 +740,14 @@ def _prim(name: str, values: Mapping[str, str], units: Mapping[str, Fraction]) -
     length, kilogram = units.get("metersPerUnit", Fraction(1, 100)), units.get("kilogramsPerUnit", Fraction(1))
     numbers = _Numbers(f"prim {name}")
     parts = [*values["diagonalInertia"].replace(",", " ").split(), "0", "0", "0"]
-    if len(parts) != 6:
-        raise InputError(f"{numbers.where}: diagonalInertia has {len(parts) - 3} numbers.", "Give 3.")
-    if "inf" in values.get("centerOfMass", "") or not any(numbers.read(values["diagonalInertia"], "diagonalInertia")):
+    diagonal = numbers.some(values["diagonalInertia"], "diagonalInertia", 3)
+    if "inf" in values.get("centerOfMass", "") or not any(diagonal):
         raise InputError(
             f"{numbers.where}: an infinite centre of mass or a tensor of zeros has USD compute it from the shapes.",
             "Give physics:centerOfMass and physics:diagonalInertia in numbers.",
         )
     six, slack = numbers.tensor(parts, ("I1", "I2", "I3", "I12", "I13", "I23"))
-    axes = numbers.read(values.get("principalAxes"), "principalAxes", "1 0 0 0")
-    if len(axes) != 4:
-        raise InputError(f"{numbers.where}: principalAxes has {len(axes)} numbers.", "Give a quaternion w, x, y, z.")
+    axes = numbers.some(values.get("principalAxes"), "principalAxes", 4, "1 0 0 0")
     # a quaternion of zeros says that USD computes the axes
     turn = _turn(*(axes if any(axes) else [1, 0, 0, 0]))
     scale = kilogram * length**2
@@ -826,7 +821,7 @@ def _toml_table(name: str, table: Mapping[str, Any]) -> BodyInFile:
     if len(texts) == 3:
         texts += ["0"] * 3
     if len(texts) != 6:
-        raise InputError(f"{numbers.where}: inertia has {len(texts)} numbers.", "Give 3, 6 or 9.")
+        raise InputError(f"{numbers.where}: inertia must have 3, 6 or 9 numbers; got {len(texts)}.", "Give 3, 6 or 9.")
     six, slack = numbers.tensor(texts, ("I11", "I22", "I33", "I12", "I13", "I23"))
     centre = numbers.three(" ".join(_texts(table.get("centre", ["0", "0", "0"]))), "centre")
     mass = numbers.one(str(table["mass"]), "mass")

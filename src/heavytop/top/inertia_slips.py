@@ -14,7 +14,7 @@ from fractions import Fraction
 from itertools import chain, combinations, permutations, product
 
 from heavytop.errors import InputError
-from heavytop.precision import Vector, cross, decimal_text, distinct_digits, dot, round_to
+from heavytop.precision import Vector, cross, decimal_text, distinct_digits, dot, round_to, six_digits
 from heavytop.top.attitude import Rows, multiplied, transposed
 
 Tensor = tuple[Vector, Vector, Vector]
@@ -163,7 +163,7 @@ def mending(body: MassProperties) -> str:
     for slip in slips(body):
         if None in slip.inertia or slip.inertia == body.six:
             return slip.sentence
-        numbers = ", ".join(decimal_text(value, 6) for value in slip.inertia if value is not None)
+        numbers = ", ".join(six_digits(value) for value in slip.inertia if value is not None)
         return f"{slip.sentence} Corrected: inertia = [{numbers}]."
     return ""
 

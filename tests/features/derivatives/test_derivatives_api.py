@@ -111,7 +111,7 @@ def scored(jacobians, **options):
             (reference(derivatives=which), InputError, "derivatives must be")
             for which in ("", "Start", "both", 1, True, ["start"])
         ),
-        (reference(SYMMETRIC, ["1e9"], derivatives="start"), OutOfReach, "Derivatives at t = 1"),
+        (reference(SYMMETRIC, ["1e9"], derivatives="start"), OutOfReach, "derivatives at t = 1"),
         (
             reference(ht.Body(1, 1, ("1/2", 0, 0), IRRATIONAL, "pivot"), [1], derivatives="start"),
             InputError,
@@ -120,11 +120,11 @@ def scored(jacobians, **options):
         (scored(np.zeros((2, 6, 6)), derivatives="all"), InputError, "cannot be scored"),
         (scored(np.zeros((2, 6))), InputError, "shape"),
         (scored(np.zeros((2, 5, 6))), InputError, "shape"),
-        (scored(np.zeros((3, 6, 6))), InputError, "3 Jacobians"),
+        (scored(np.zeros((3, 6, 6))), InputError, "equally many; got 2 and 3"),
         (scored([np.zeros((6, 6)), np.zeros((6, 5))]), InputError, r"jacobians\[1\]"),
         (scored([[["x"] * 6] * 6] * 2), InputError, "x"),
         (scored(None), InputError, "jacobians"),
-        (scored([]), InputError, "0 Jacobians"),
+        (scored([]), InputError, "equally many; got 2 and 0"),
     ],
 )
 def test_what_has_no_derivatives_or_is_none_is_refused(call, error, why):

@@ -109,10 +109,10 @@ def test_what_changes_nothing_is_not_planted_and_what_is_unknown_is_refused() ->
     for call, words in (
         (lambda: ht.power(TOP, START, 1, "1e-3", planted="typo"), "Unknown fault 'typo'"),
         (lambda: ht.power(TOP, START, 0, "1e-3"), "must be positive"),
-        (lambda: ht.power(TOP, START, 1, "1e-3", "1e-7"), "more than 100000"),
+        (lambda: ht.power(TOP, START, 1, "1e-3", "1e-7"), "At most 100000 samples"),
         (lambda: ht.between_samples(TOP, START, 1, 2), "at most until"),
         (lambda: ht.between_samples(TOP, START, 1, "1/10", 0), "between 1e-12 and 1"),
-        (lambda: ht.between_samples(TOP, START, 1, "1e-6"), "are more than"),
+        (lambda: ht.between_samples(TOP, START, 1, "1e-6"), "At most 20000 intervals"),
         (lambda: ht.digits_end(TOP, START, 0), "until must not be 0"),
     ):
         with pytest.raises(ht.InputError, match=words):

@@ -132,7 +132,7 @@ def test_what_is_not_finite_is_a_verdict(word: str, tmp_path: Path) -> None:
         ({"gamma": None}, "The key gamma is missing"),
         ({"weight": None}, "The key weight is missing"),
         ({"times": []}, "No times were given"),
-        ({"times": ["1", "2"]}, "2 times and 3 states"),
+        ({"times": ["1", "2"]}, "equally many; got 2 and 3"),
         ({"times": ["2", "1", "3"]}, "must move strictly away from 0"),
         ({"times": ["1", "-2", "3"]}, "different signs"),
         ({"times": ["1", "nan", "3"]}, "Row 2, t must be finite; got nan"),

@@ -131,11 +131,11 @@ def algebraic_motion(
     except ZeroDivisionError:
         curve = None
     if curve is None or min(curve.inertia) <= 0 or curve.gamma_square() <= 0:
-        raise InputError(f"No top has {name} motion with these numbers.", "Its builder says which are possible.")
+        raise InputError(f"No top has {name} motion with these parameters.", "Its constructor lists the possible ones.")
     if place is None:
         intervals = gaps(curve)
         if not intervals:
-            raise InputError(f"{name} motion of this top is not real.", "Its builder says which are.")
+            raise InputError(f"{name} motion of this top is not real.", "Its constructor lists the real ones.")
         (low, high), *_ = intervals
         unit = Fraction(2) ** (exponent(Fraction(high) - Fraction(low)) - 4)
         place = round(Fraction(low + high) / (2 * unit)) * unit

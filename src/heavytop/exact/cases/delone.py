@@ -70,7 +70,7 @@ from heavytop.top.heavy_top import HeavyTop, State
 # φ(e) ≥ 0 keeps e out of the gap.  A double root of the cubic leaves no period: refused.
 
 
-_REMEDY = "Ask for the state alone, or for the enclosure's attitude."
+_REMEDY = "Request the state alone, or the attitude of the enclosure."
 MOST_TERMS = 1 << 16
 
 

@@ -423,7 +423,7 @@ class Uniform:
             bound = float((2 * size * middle).sqrt().upper()) * _ROUNDING
             return cls(None, None, (bound, bound))
         if not isinstance(variable, Gap):
-            raise OutOfReach("The azimuth of an asymptotic motion is not done.", "Ask for the state alone.")
+            raise OutOfReach("The azimuth of an asymptotic motion is not implemented.", "Request the state alone.")
         low, high = variable.middle - variable.reach, variable.middle + variable.reach
         gap, strip = Gap(low, high, variable.rest, count=1), Strip.of(motion, variable, other)
         return cls(gap, (strip.height / gap.means[0]).lower(), strip.largest)
@@ -595,6 +595,6 @@ def _require_done(level: GoryachevLevel) -> None:
             raise LevelNotDone("The level is degenerate: one variable rests, and the other passes it.", REMEDY)
         apart = min((distance_of_others([root.value for root in curve], pair) for pair in moving), key=arb.mid)
         if not apart > _DISTANCE:
-            refuse("The level is degenerate", apart, "a root to a gap")
+            refuse("The level is degenerate", apart, "a root from an oscillation interval")
 
     decide(test)

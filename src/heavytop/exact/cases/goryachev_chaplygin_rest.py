@@ -106,7 +106,7 @@ class GoryachevChaplyginRest(WithBearing, ClosedForm):
         """The bearing of M, along γ × n at rest; raises OutOfReach for h = a."""
         motion = _motion(self)
         if isinstance(motion, UprightMotion):
-            raise OutOfReach("The azimuth of M is not known for h = a.", "Integrate the attitude along with it.")
+            raise OutOfReach("The azimuth of M is not known for h = a.", "Integrate the attitude with the motion.")
         with series_length(1):
             pair = motion.at(ball(motion.level.rate * time))
             gamma, momentum = (motion.level.in_body(v) for v in (pair.state()[3:], pair.momentum()))
@@ -240,9 +240,9 @@ class RestMotion:
         total = (acb(end) - middle) * slope(acb(end), False) + acb.integral(slope, acb(0), middle)
         if next(evaluations) > _MOST_VALUES:
             raise OutOfReach(
-                f"The azimuth of M takes more than {_MOST_VALUES} values of its integrand: gamma at rest is all but "
-                "in line with the centre of mass, or all but level beside it.",
-                "Integrate the attitude along with it.",
+                f"The azimuth of M takes more than {_MOST_VALUES} values of its integrand: gamma at rest is nearly "
+                "parallel or perpendicular to the centre of mass.",
+                "Integrate the attitude with the motion.",
             )
         return -4 * self.tilt * self.across * self.upright * total.real
 

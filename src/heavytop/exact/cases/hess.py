@@ -163,7 +163,7 @@ class Hess(WithBearing, ClosedForm):
         if cubic.gcd(cubic.derivative()).degree() > 0:
             raise LevelNotDone("The level is degenerate: P r·gamma rests at a double root.", REMEDY)
         # the Fourier series of the elliptic integral may be too long, or the linear system
-        decide(lambda: plan(_linear(level, level.gap(_MOST_TERMS))), "The level is all but degenerate", _LEAST)
+        decide(lambda: plan(_linear(level, level.gap(_MOST_TERMS))), "The level is nearly degenerate", _LEAST)
 
     def own_time(self, time: Fraction) -> Fraction:
         """``time`` in the unit of the level: the matrix over its period is costly at many bits."""

@@ -195,9 +195,9 @@ def plan(system: System2) -> list[Disc]:
         left = disc.right
         if len(discs) > MOST_SEGMENTS:
             raise OutOfReach(
-                f"The linear system over the period has more than {MOST_SEGMENTS} segments: M·gamma is all but 0, or "
+                f"The linear system over the period has more than {MOST_SEGMENTS} segments: M·gamma is nearly 0, or "
                 "the moments differ by many decades.",
-                "Ask for an earlier time.",
+                "Give an earlier time.",
             )
     return discs
 
@@ -233,7 +233,7 @@ class Transfer:
         if work > _MOST_WORK:
             raise OutOfReach(
                 f"The linear system of Hess' top has {len(planned)} segments, too many at {current_precision()} bits.",
-                "Ask for fewer digits.",
+                "Request fewer digits.",
             )
         now = arb_mat([[1, 0], [0, 1]])
         segments, before = [], []

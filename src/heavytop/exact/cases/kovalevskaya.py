@@ -421,7 +421,10 @@ class KovalevskayaAttitude:
         """
         level = motion.level
         if any(isinstance(variable, Rest) for variable in motion.line.variables):
-            raise OutOfReach("The azimuth of a motion with a variable at rest is not done.", "Ask for the state alone.")
+            raise OutOfReach(
+                "The azimuth of a motion with a constant separated variable is not implemented.",
+                "Request the state alone.",
+            )
         apart = level.double() ** 2 - level.fourth
         if apart == 0 or level.area == 0:
             return cls(motion, (), 1 if _factor(level, level.turned()) > 0 else -1)
@@ -547,7 +550,7 @@ class Kovalevskaya(WithBearing, ClosedForm):
 
         def evaluate(working: int) -> list[arb]:
             if isinstance(_motion(self), ThetaMotion) or not _has_thetas(KovalevskayaLevel.of(self.top, self.start)):
-                raise OutOfReach("There is one closed form of this motion only.", "Certify it by the enclosure.")
+                raise OutOfReach("This motion has only one closed form.", "Certify it by the enclosure.")
             return _thetas(self).at(time, 1)
 
         return to_bits(evaluate, bits, time, 1)
@@ -614,4 +617,4 @@ def _require_apart(curve: Sequence[PhiRoot], ends: Sequence[Interval], name: str
             raise LevelNotDone(f"{name}, one separated variable rests at e, and the other passes it.", REMEDY)
     nearest = separation([root.value for root in curve])
     if not nearest >= SEPARATION and pole(curve, ends)[1] < _DISTANCE:
-        refuse(name, nearest, "two roots over the largest")
+        refuse(name, nearest, "two roots, relative to the largest")

@@ -319,7 +319,7 @@ class Steklov(WithBearing, ClosedForm):
     def __post_init__(self) -> None:
         ClosedForm.__post_init__(self)
         # the Fourier series of Abel's integral may be too long, or the start too near to a turning point
-        name = "Two moments of inertia all but satisfy an equality, or the start a turning point's"
+        name = "Two moments of inertia nearly satisfy an equality, or the start is nearly a turning point"
         decide(lambda: _motion(self), name, _LEAST)
 
     def evaluate(self, time: Fraction) -> list[BallLike]:

@@ -83,8 +83,8 @@ class ZhukovskyVolterra(ClosedForm):
         g2, g3 = self.invariants()
         if not self.permanent and g2**3 == 27 * g3**2:
             raise LevelNotDone(
-                "|M|^2 and the energy touch: the motion is aperiodic, or that of a symmetric top.",
-                "The enclosure proves such a motion, up to its reach.",
+                "|M|^2 and the energy have tangent level surfaces: the motion is aperiodic, or the top symmetric.",
+                "Use the enclosure for this motion.",
             )
         if not self.permanent:
             _exact(self)
@@ -273,7 +273,7 @@ def _kernel(equations: Sequence[Sequence[Fraction]]) -> list[Fraction]:
     matrix: Any = fmpq_mat([[rational(value) for value in line] for line in equations])
     basis, count = matrix.numer_denom()[0].nullspace()
     if count != 1:
-        raise LevelNotDone("The curve of M is degenerate.", "The enclosure proves such a motion, up to its reach.")
+        raise LevelNotDone("The curve of M is degenerate.", "Use the enclosure for this motion.")
     return [Fraction(int(row[0])) for row in basis.table()]
 
 

@@ -71,7 +71,7 @@ from heavytop.multiword.fixed_point.certified_series import CertifiedSeries, Wor
 from heavytop.multiword.fixed_point.first_variation import CertifiedColumns, WordColumns
 from heavytop.multiword.fixed_point.fixed_point_run import excess
 from heavytop.multiword.integers.integer_series import QuadraticComponent, coefficients, horner
-from heavytop.precision import decimal_text
+from heavytop.precision import six_digits
 from heavytop.top.equations import Parameters, System
 
 # One proven step of the derivatives of the state at its end with respect to the state at its beginning and to the data.
@@ -433,8 +433,8 @@ def _one_way(
             return enclosed
         bits_of_motion, bits_of_columns = (before[0] + lacking + _GUARD // 2 for before in (planned, of_columns))
     raise OutOfReach(
-        f"Derivatives at t = {decimal_text(time, 6)} to so many digits are out of reach of a validated integration.",
-        "Ask for fewer digits, or for an earlier time.",
+        f"Validated integration cannot prove so many digits of the derivatives at t = {six_digits(time)}.",
+        "Request fewer digits, or an earlier time.",
     )
 
 
@@ -511,9 +511,8 @@ def _require_right(tangent: Tangent, motion: ScaledMotion) -> None:
         lack = sum(lacking(tangent.together, together, tangent.precision, halvings)[: along.order])
         if lack > Fraction(max(along.rounding, *computed.rounding)):
             raise Contradiction(
-                f"Machine code in {tangent.precision} bits gives derivatives that are further from the truth than they "
-                "can be.",
-                "It is damaged: run again; if it stays, this machine or LLVM is faulty.",
+                f"Machine code in {tangent.precision} bits gives derivatives whose error exceeds its proven bound.",
+                "It is damaged: run again. If the error persists, this machine or LLVM is faulty.",
             )
         _seen_right.add(key)
         return

@@ -59,7 +59,7 @@ from heavytop.multiword.fixed_point import fixed_point_run
 from heavytop.multiword.fixed_point.arithmetic import Grid, grid_of
 from heavytop.multiword.fixed_point.certified_series import CertifiedSeries
 from heavytop.multiword.problem import Scaled
-from heavytop.precision import Vector, decimal_text
+from heavytop.precision import Vector, six_digits
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -354,9 +354,8 @@ class ScaledMotion:
             if series is not None:
                 if sum(lacking(self.field, series, grid.total, halvings)) > Fraction(series.rounding):
                     raise Contradiction(
-                        f"Machine code in {grid.total} bits gives Taylor coefficients that are further from the truth "
-                        "than they can be.",
-                        "It is damaged: run again; if it stays, this machine or LLVM is faulty.",
+                        f"Machine code in {grid.total} bits gives Taylor coefficients whose error exceeds its bound.",
+                        "It is damaged: run again. If the error persists, this machine or LLVM is faulty.",
                     )
                 _seen_right.add(key)
                 return
@@ -432,8 +431,8 @@ class Validated:
         rate = coefficient_bound(motion.field, max(map(abs, motion.scaled.state)))
         if rate > _LARGEST_RATE:
             raise OutOfReach(
-                f"The motion may change 2^{exponent(rate)} times as fast as it turns.",
-                "Validated integration needs moments, weight and rates of less different size.",
+                f"The rate of change of the motion may be 2^{exponent(rate)} times its angular velocity.",
+                "Validated integration needs moments, weight and rates of more similar size.",
             )
 
     @property
@@ -598,13 +597,13 @@ class Validated:
         return reachable
 
     def _refusal(self, time: Fraction, reachable: int) -> OutOfReach:
-        at, digits = decimal_text(time, 6), int((reachable - 5) * log10(2))  # rounded up they take up to 5 bits more
+        at, digits = six_digits(time), int((reachable - 5) * log10(2))  # rounded up they take up to 5 bits more
         if digits < 1:
-            cause = f"No digit at t = {at} is within reach of a validated integration. {self.level}"
-            return OutOfReach(cause.strip(), "Ask for an earlier time.")
+            cause = f"Validated integration cannot prove a digit at t = {at}. {self.level}"
+            return OutOfReach(cause.strip(), "Give an earlier time.")
         return OutOfReach(
-            f"So many digits at t = {at} are out of reach of a validated integration. {self.level}".strip(),
-            f"About {digits} digits could be proven there: ask for fewer, or for an earlier time.",
+            f"Validated integration cannot prove so many digits at t = {at}. {self.level}".strip(),
+            f"About {digits} digits could be proven there: request fewer, or an earlier time.",
         )
 
 

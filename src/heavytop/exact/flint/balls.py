@@ -40,8 +40,8 @@ def require_handy(top: HeavyTop, start: State, times: Iterable[Fraction] = ()) -
         length = max(value.numerator.bit_length(), value.denominator.bit_length())
         if length > _LONGEST:
             raise OutOfReach(
-                f"A number of the top, the start or a time is a fraction of {length} bits.",
-                f"References are proven for fractions of up to {_LONGEST} bits, 1e-9000 to 1e9000: choose other units.",
+                f"The numbers of top, start and times must have at most {_LONGEST} bits; got {length}.",
+                "Choose other units: 1e-9000 to 1e9000 are supported.",
             )
 
 
@@ -527,7 +527,7 @@ def to_bits(
         if working >= most:
             raise OutOfReach(
                 f"Only {max(reached, 0)} of {bits} bits could be proven at a working precision of {inside} bits.",
-                "Ask for fewer digits or an earlier time; moments, weights and rates of very different size cost most.",
+                "Request fewer digits or an earlier time; moments, weights and rates of very different size cost most.",
             )
         working = min(most, working + (max(bits - reached, working // 2) if reached >= 0 else working))
 

@@ -242,13 +242,13 @@ ends: √(v − lo) and √(hi − v), each with a sign that makes it analytic; 
 # with time.  One of the two may rest; then one integral of the other remains, and grows linearly too.
 
 
-REMEDY = "The validated enclosure holds for every motion."
+REMEDY = "Use the enclosure, which covers every motion."
 _DECISIONS, _RIGHT = (64, 256, 1024, 4096), 10
 
 
 @whole_evaluation
 def decide(
-    test: Callable[[], object], name: str = "The level is degenerate but for less than about 1e-300", least: int = 64
+    test: Callable[[], object], name: str = "The level is degenerate to within about 1e-300", least: int = 64
 ) -> None:
     """Run ``test`` at the first working precision that suffices for it, at least ``least`` bits.
 
@@ -265,14 +265,14 @@ def decide(
             except OutOfReach as error:
                 raise LevelNotDone(f"{name}: {error.cause}", REMEDY) from error
         return
-    raise LevelNotDone(f"{name}: {_DECISIONS[-1]} bits do not tell them apart.", REMEDY)
+    raise LevelNotDone(f"{name}: {_DECISIONS[-1]} bits do not resolve the distance.", REMEDY)
 
 
 def refuse(name: str, apart: arb, of: str) -> NoReturn:
     """Raise LevelNotDone with the distance, or Undecided where the working precision does not determine it."""
     if apart.rel_accuracy_bits() < _RIGHT:
         raise Undecided
-    raise LevelNotDone(f"{name} but for {apart.str(2, radius=False)}, the distance of {of}.", REMEDY)
+    raise LevelNotDone(f"{name} to within {apart.str(2, radius=False)}, the distance of {of}.", REMEDY)
 
 
 def ordered(roots: Sequence[acb]) -> list[int]:
@@ -445,7 +445,7 @@ def counts(widths: Sequence[arb | None]) -> tuple[int, int]:
     if first * second * (first + second) > _MOST_WORK:
         raise OutOfReach(
             f"The azimuth needs {first} x {second} Fourier terms: the level is nearly degenerate.",
-            "Ask for fewer digits, or take a start farther from the degenerate motion.",
+            "Request fewer digits, or choose a start farther from the degenerate level.",
         )
     return first, second
 

@@ -217,11 +217,11 @@ class FourierBound:
     def terms(self, most: int) -> int:
         """N, 2^k or 3·2^k, with an error of the sums below the working precision."""
         if not self.wanted <= most:
-            many = f"{self.wanted:.3g}" if isfinite(self.wanted) else "countless"
+            many = f"{self.wanted:.3g}" if isfinite(self.wanted) else "infinitely many"
             raise OutOfReach(
-                f"Abel's integrals need {many} Fourier terms, more than {most}: the level is degenerate but for "
-                f"{self.distance:.2g}, the distance of a root to a gap.",
-                "Ask for fewer digits, or take a start farther from the degenerate motion.",
+                f"Abel's integrals need {many} Fourier terms, more than {most}: the level is degenerate to within "
+                f"{abs(self.distance):.2g}, the distance of a root from an oscillation interval.",
+                "Request fewer digits, or choose a start farther from the degenerate level.",
             )
         power = max(32, 1 << ceil(self.wanted).bit_length())
         return power // 4 * 3 if power // 4 * 3 >= self.wanted else power

@@ -221,8 +221,8 @@ def divergence_time(case: PartialCase, horizon: Fraction, branch: Branch) -> Div
             return DivergenceTime(before / case.alpha, (before + step) / case.alpha)
         elif step <= _SHORTEST * before:
             raise OutOfReach(
-                f"Claim and truth are 1 % of alpha apart at t = {shown(before / case.alpha)} and no more.",
-                "Ask for an earlier horizon.",
+                f"Claim and true motion differ by only 1 % of alpha at t = {shown(before / case.alpha)}.",
+                "Give an earlier horizon.",
             )
         else:
             step /= 2

@@ -11,11 +11,11 @@ from typing import Any
 from heavytop import arguments
 from heavytop.arguments import MOST_STATES, Number, Numbers, bits_of, component, required
 from heavytop.display import Tabular, TitledTable
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, quoted, require_as_many
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.derivatives import PARAMETERS, STARTS, Derivatives, known_derivatives
 from heavytop.measure.scalar import digits_of, digits_text
-from heavytop.precision import decimal_text, exact, log10, ordered, shown
+from heavytop.precision import decimal_text, exact, exact_text, log10, ordered
 from heavytop.top.bodies import Body
 from heavytop.top.equations import NAMES, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -116,7 +116,7 @@ def _matrices(jacobians: Any, count: int) -> list[list[list[Any]]]:
     """The entries as given; raises InputError for another shape."""
     shape = getattr(jacobians, "shape", None)
     if shape is not None and (len(shape) != 3 or tuple(shape[1:]) != (6, 6)):
-        raise InputError(f"The Jacobians have the shape {tuple(shape)}.", _SHAPE)
+        raise InputError(f"jacobians must have the shape (n, 6, 6); got {tuple(shape)}.", _SHAPE)
     matrices = []
     for i, matrix in enumerate(ordered(jacobians, "jacobians", _SHAPE)):
         rows = [
@@ -128,8 +128,7 @@ def _matrices(jacobians: Any, count: int) -> list[list[list[Any]]]:
                 f"jacobians[{i}] has {len(rows)} rows of {sorted({len(r) for r in rows})} numbers.", _SHAPE
             )
         matrices.append([list(row) for row in rows])
-    if len(matrices) != count:
-        raise InputError(f"There are {count} times and {len(matrices)} Jacobians.", "Give one Jacobian for each time.")
+    require_as_many("Jacobians", len(matrices), count)
     if count > MOST_STATES:
         raise InputError(f"{count} Jacobians are too many to score.", f"Give at most {MOST_STATES}.")
     return matrices
@@ -159,7 +158,7 @@ def _scored(
     return DerivativeScore(
         outcome.value,
         right,
-        tuple(shown(time) for time in times),
+        tuple(map(exact_text, times)),
         digits,
         names,
         tuple(float(decimal_text(error, 17)) for error, _ in errors),

@@ -19,12 +19,12 @@ import numpy
 from flint import Ordering, fmpq, fmpq_mpoly_ctx, fmpq_series
 from numpy.typing import NDArray
 
-from heavytop.display import LazyLines, Tabular, TitledTable
+from heavytop.display import LazyLines, Tabular, TitledTable, plural
 from heavytop.errors import InputError, quoted
 from heavytop.exact.flint.balls import radius_text, rational
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.reference import Ball, rounded_up
-from heavytop.precision import Array, decimal_text, exact, native_text
+from heavytop.precision import Array, decimal_text, exact, native_text, six_digits
 from heavytop.top.equations import NAMES, VARIABLES, Parameters, System, component
 
 _GREEK = {f"{greek}{axis}": f"{name}{axis}" for greek, name in (("Ω", "omega"), ("γ", "gamma")) for axis in (1, 2, 3)}
@@ -430,7 +430,7 @@ class Events(Tabular):
             return ""
         kinds = Counter(kind for _, kind in self.discontinuities)
         counted = " and ".join(f"{count} {kind}{'s' * (count > 1)}" for kind, count in kinds.items())
-        first = decimal_text(exact(self.discontinuities[0][0]), 6)
+        first = six_digits(exact(self.discontinuities[0][0]))
         return f"no events, though the sign changes: {counted} of the function, first at t = {first}"
 
     def texts(self) -> list[list[str]]:
@@ -462,11 +462,11 @@ class Events(Tabular):
     def _table(self) -> TitledTable:
         title = (
             f"{_counted(self)} {self.function} in {self.problem.precision.name} by {self.integrator}, "
-            f"t = 0 to {decimal_text(self.until, 6)}"
+            f"t = 0 to {six_digits(self.until)}"
         )
         notes = [_EXPLAINED[self.guarantee], *filter(None, [self.discontinuity_text()])]
         if self.outcome is not Outcome.SUCCESS:
-            notes.append(f"{self.outcome.message}; looked up to t = {decimal_text(self.time_reached, 6)} only")
+            notes.append(f"{self.outcome.message}; searched to t = {six_digits(self.time_reached)} only")
         return _listed(self, title, self.problem.precision.digits, exact, notes)
 
 
@@ -516,8 +516,10 @@ class ReferenceEvents(Tabular, msgspec.Struct, frozen=True):
 
     def _table(self) -> TitledTable:
         worst = max((Fraction(ball.radius) for ball in self.times), default=Fraction(0))
-        title = f"{_counted(self)} {self.function}, known to {self.digits} digits, t = 0 to {self.until[:_SHOWN]}"
-        notes = [_EXPLAINED[PROVEN], f"largest radius of a time {radius_text(worst)}; {self.method}"]
+        until = six_digits(exact(self.until))
+        title = f"{_counted(self)} {self.function}, known to {self.digits} digits, t = 0 to {until}"
+        radius = f"largest radius of a time {radius_text(worst)}; " if self.times else ""
+        notes = [_EXPLAINED[PROVEN], f"{radius}{self.method}"]
         return _listed(self, title, self.digits, lambda ball: exact(ball.value), notes)
 
 
@@ -552,7 +554,8 @@ class Section(Tabular):
             return [str(index), str(len(event)), f"{self.energies[index]:.9g}", f"{self.areas[index]:.9g}"]
 
         first = self.events[0]
-        title = f"Poincaré section {first.function} of {len(self)} motions, {sum(map(len, self.events))} points"
+        points = plural(sum(map(len, self.events)), "point")
+        title = f"Poincaré section {first.function} of {plural(len(self), 'motion')}, {points}"
         notes = [] if self.on_one_level else ["the starts are on different levels of energy or M·γ"]
         return TitledTable(title, ("start", "points", "energy", "M·γ"), LazyLines(len(self), line), notes)
 

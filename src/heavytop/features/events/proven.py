@@ -213,7 +213,7 @@ def proven_events(
     assert undecided is not None
     raise OutOfReach(
         f"Near t = {decimal_text(undecided.time, 12)} it is not decided {undecided.cause}.",
-        "Ask for another until, or another value of the function: a zero that it only touches cannot be proven.",
+        "Give another until, or another value of the function: a double zero cannot be proven.",
     )
 
 

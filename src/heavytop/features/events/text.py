@@ -11,7 +11,7 @@ from rich.text import Text
 from heavytop.display import printable
 from heavytop.features.events.functions import Events, ReferenceEvents
 from heavytop.integrate.trajectory import Outcome
-from heavytop.precision import decimal_text
+from heavytop.precision import six_digits
 from heavytop.top.equations import NAMES
 
 
@@ -24,9 +24,7 @@ def events_text(sections: Sequence[Events | ReferenceEvents]) -> RenderableType:
             Text(f"Events {printable(section.function)}: {len(section)}, {section.guarantee}", style="bold"),
         ]
         if isinstance(section, Events) and section.outcome is not Outcome.SUCCESS:
-            parts.append(
-                Text(f"Looked up to t = {decimal_text(section.time_reached, 6)} only: {section.outcome.message}.")
-            )
+            parts.append(Text(f"Searched to t = {six_digits(section.time_reached)} only: {section.outcome.message}."))
         if isinstance(section, Events):
             if discontinuities := section.discontinuity_text():
                 parts.append(Text(f"{discontinuities[:1].upper()}{discontinuities[1:]}."))

@@ -92,7 +92,7 @@ def hunt(
     if not time:
         raise InputError("horizon must not be zero.", "Give a time other than 0, such as 100.")
     if which == "heyoka" and form == DOUBLE_DOUBLE:
-        raise InputError("heyoka has no double-double.", "Use --integrator multiword, or another format.")
+        raise InputError("heyoka does not support double-double.", "Use --integrator multiword, or another format.")
     motions, seconds = _budget(budget)
     beyond = None if limit is None else float(physical(limit, "limit"))
     if beyond is not None and not beyond > 0:

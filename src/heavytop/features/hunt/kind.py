@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from pathlib import Path
 
+from heavytop.display import plural
 from heavytop.errors import InputError, quoted
 from heavytop.features.hunt.measured import Family
 from heavytop.features.hunt.search import Hunted, HuntRequest, command_of, hunt, keep, kept
@@ -89,7 +90,7 @@ class HuntKind(Kind):
         if hunted.found:
             return failed(task, _cause(hunted))
         lost = f"{hunted.lost} of which no format of its size can follow"
-        measured = f"the worst of {hunted.motions} motions, {lost}"
+        measured = f"the worst of {plural(hunted.motions, 'motion')}, {lost}"
         law = f"{hunted.law:.2g} eps times the motion's amplification times √(1 + rate T)"
         return exact_row(task, measured, Against("equations", law), _metrics(hunted), request.precision.bits)
 
@@ -122,7 +123,7 @@ def _cause(hunted: Hunted) -> str:
     error = f"an error of {m.error:.3g}" if math.isfinite(m.error) else f"the run ends as {m.outcome}"
     name = hunted.request.integrator.name
     command = command_of(hunted.request, m.motion, name, math.isinf(m.error))
-    return f"{name}, of {hunted.motions} motions: {error}, {command};"
+    return f"{name}, of {plural(hunted.motions, 'motion')}: {error}, {command};"
 
 
 def _metrics(hunted: Hunted) -> dict[str, Metric]:

@@ -598,7 +598,7 @@ def _moments(top: HeavyTop) -> list[str]:
         excess = float(a / b / ratio - 1)
         if ratio <= 3 and abs(excess) < _NEAR * 20:
             names = (i, j) if top.inertia[i] == a else (j, i)
-            difference = "" if excess == 0 else f" but for {abs(excess):.1g}"
+            difference = "" if excess == 0 else f" to within {abs(excess):.1g}"
             sentences.append(f"I{names[0] + 1}/I{names[1] + 1} = {ratio}{difference}")
     slack = float((sum(top.inertia) - 2 * max(top.inertia)) / max(top.inertia))
     if slack < _NEAR * 20:

@@ -57,11 +57,13 @@ _MOST_ROUNDS = 12
 _TOGETHER = 8
 _DIRECTION_NORMS = (1, 2, 3, 5, 7, 9, 11, 13, 15, 17, 25, 33, 51, 65, 99, 201, 301, 451, 651, 901, 999)
 _MOST_DENOMINATOR = 31
+_EXACT = 61
+"""Characters of a fraction of two numbers below 2^100."""
 
 
 def digits(value: Fraction) -> int:
     """The significant digits that a number is written with: 0 of 0, 1 of 5000 and of 1e-8, 2 of 3/2."""
-    text = shown(value).lstrip("-").partition("e")[0]
+    text = shown(value, _EXACT).lstrip("-").partition("e")[0]
     return sum(len(part.replace(".", "").strip("0")) for part in text.split("/"))
 
 
@@ -70,7 +72,7 @@ def complexity(motion: Motion) -> tuple[int, int, int]:
     top, start = motion
     values = [*top.inertia, top.weight, *top.centre, *(top.rotor or ()), *start.omega, *start.gamma]
     numbers = sum(value not in (0, 1) for value in values)
-    lengths = sum(len(shown(value)) for value in values) + sum(value < 0 for value in values)
+    lengths = sum(len(shown(value, _EXACT)) for value in values) + sum(value < 0 for value in values)
     return sum(map(digits, values)), numbers + len(set(top.inertia)), lengths
 
 

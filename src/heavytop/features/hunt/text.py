@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from textwrap import fill
 from typing import Any
 
+from heavytop.display import plural
 from heavytop.features.hunt.measured import MeasuredMotion, class_of, special
 from heavytop.features.hunt.search import DECADES, Hunted, Proof, digits_lost, ratio
 from heavytop.integrate.registry import Integrator
@@ -50,7 +51,7 @@ def worst_lines(hunted: Hunted) -> list[str]:
 def _searched(hunted: Hunted) -> str:
     request = hunted.request
     text = f"{request.integrator.name} in {request.precision.name} to T = {time_text(request.horizon)}: "
-    text += f"{hunted.motions} motions tried of {hunted.planned}."
+    text += f"{plural(hunted.motions, 'motion')} tried of {hunted.planned}."
     if hunted.unknown:
         text += f" The true motion of {hunted.unknown} was out of reach."
     if hunted.lost:

@@ -16,7 +16,7 @@ from heavytop.display import Tabular, TitledTable
 from heavytop.errors import InputError
 from heavytop.integrate.frames import Setup
 from heavytop.integrate.registry import propagator
-from heavytop.precision import Array, decimal_text, exact_text, physical
+from heavytop.precision import Array, exact_text, physical, six_digits
 from heavytop.top.bodies import Body
 from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State, check_times
@@ -55,13 +55,13 @@ class BetweenSamples(Tabular):
         def row(name: str) -> tuple[str, ...]:
             error, best = self.errors[name], self.largest.get(name)
             cells = (name, "too few samples" if error is None else f"{error:.2e}")
-            return cells if self.within is None else (*cells, "none" if best is None else decimal_text(best, 6))
+            return cells if self.within is None else (*cells, "none" if best is None else six_digits(best))
 
         head = ("method", "largest error")
         spacings = () if self.within is None else (f"largest Δt for {self.within:.1e}",)
-        title = f"Between samples {decimal_text(self.spacing, 6)} apart"
+        title = f"Between samples {six_digits(self.spacing)} apart"
         if self.asked != self.spacing:
-            title += f" ({decimal_text(self.asked, 6)}, reduced to a divisor of the last time)"
+            title += f" ({six_digits(self.asked)}, reduced to a divisor of the last time)"
         return TitledTable(title, (*head, *spacings), [row(name) for name in METHODS])
 
 
@@ -97,7 +97,7 @@ def between_samples(
         raise InputError(f"within must be between 1e-12 and 1; got {within}.", "Give, for example, 1e-6.")
     count = int(-(-end // step))
     if count > _MOST:
-        raise InputError(f"{count} intervals are more than {_MOST}.", "Give a larger spacing, or an earlier time.")
+        raise InputError(f"At most {_MOST} intervals; got {count}.", "Give a larger spacing or an earlier time.")
     errors = cache(partial(_errors, body, state, about, end))
     largest = {} if target is None else {name: _largest(errors, name, target, end, count) for name in METHODS}
     return BetweenSamples(end, end / count, errors(count), target, largest, step)

@@ -24,7 +24,7 @@ from heavytop.exact.solution import ExactSolution
 from heavytop.integrate.frames import Setup
 from heavytop.integrate.registry import propagator
 from heavytop.integrate.trajectory import Problem
-from heavytop.precision import DOUBLE, Precision, decimal_text, exact, exact_text, physical, real, rounded
+from heavytop.precision import DOUBLE, Precision, exact, exact_text, physical, real, rounded, six_digits
 from heavytop.top.bodies import Body
 from heavytop.top.equations import GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -82,19 +82,19 @@ class DigitsEnd(Tabular):
         lines = []
         for what, loss in (("the first digit", self.first), ("all digits", self.last)):
             if loss is None:
-                end = decimal_text(self.times[-1], 6)
+                end = six_digits(self.times[-1])
                 lines.append(f"{what}: not lost at any of {_TIMES} times up to t = {end}")
                 continue
             how = "proven" if loss.proven else "computed, beyond the reach of a proof"
             lines.append(
-                f"{what}: lost at t = {decimal_text(loss.time, 6)} by whoever rounds the state to {self.precision} "
-                f"at t = {decimal_text(loss.rounded_at, 6)}, with exact arithmetic before and after ({how})"
+                f"{what}: lost at t = {six_digits(loss.time)} by whoever rounds the state to {self.precision} "
+                f"at t = {six_digits(loss.rounded_at)}, with exact arithmetic before and after ({how})"
             )
         return lines
 
     def _table(self) -> TitledTable:
         rows = [
-            (decimal_text(time, 6), f"{digits:z.1f}")
+            (six_digits(time), f"{digits:z.1f}")
             for time, digits in [*zip(self.times, self.digits, strict=True)][_EACH - 1 :: _EACH]
         ]
         title = f"Digits that one rounding to {self.precision} leaves, of {self.of_digits:.1f}"

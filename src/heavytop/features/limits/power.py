@@ -20,7 +20,7 @@ from heavytop.display import Tabular, TitledTable
 from heavytop.errors import InputError, quoted
 from heavytop.integrate.frames import Setup
 from heavytop.integrate.registry import control_name, named, propagator
-from heavytop.precision import DOUBLE, QUAD, Array, Precision, Scalar, cross, decimal_text, exact_text, physical, real
+from heavytop.precision import DOUBLE, QUAD, Array, Precision, Scalar, cross, exact_text, physical, real, six_digits
 from heavytop.top.bodies import PIVOT, Body
 from heavytop.top.equations import GYROSTAT, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -86,12 +86,12 @@ class Power(Tabular):
         rows = [
             (
                 fault.name,
-                "not detected" if fault.detected_from is None else decimal_text(fault.detected_from, 6),
+                "not detected" if fault.detected_from is None else six_digits(fault.detected_from),
                 f"{fault.tolerance:.2g}",
             )
             for fault in self.faults
         ]
-        end = decimal_text(self.times[-1], 6)
+        end = six_digits(self.times[-1])
         verdict = "passes" if self.passes else "fails"
         notes = [f"a right run {verdict}: its largest error is {self.error:.2g}"]
         notes += [f"{name} is not planted: {why}" for name, why in self.left_out.items()]
@@ -139,7 +139,7 @@ def power(
         )
     count = int(end // spacing)
     if count > _MOST:
-        raise InputError(f"{count} samples are more than {_MOST}.", "Give a larger step, or an earlier end.")
+        raise InputError(f"At most {_MOST} samples; got {count}.", "Give a larger step, or an earlier end.")
     times = [spacing * k for k in range(1, count + 1)]
     true, method = _rows(motion, times), named(integrator)
     options = {} if control is None else {control_name(method) or "tolerance": physical(control, "control")}

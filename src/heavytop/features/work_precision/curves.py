@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from heavytop.display import plural
 from heavytop.integrate.registry import INTEGRATORS
 from heavytop.measure.scorer import ERRORS
 from heavytop.precision import exact, parse
@@ -318,7 +319,7 @@ def fastest(rows: Sequence[Row]) -> Headline | None:
     (first, count), *rest = Counter(winner for winner, _ in ends).most_common()
     ratios = [max(ratio, 1 / ratio) for (winner, _), (_, ratio) in zip(ends, ratios_of, strict=True) if winner == first]
     behind = {other for winner, other in ends if winner == first}
-    where = f"{count} of {len(ratios_of)} motions" if rest else f"all {len(ratios_of)} motions"
+    where = f"{count} of {len(ratios_of)} motions" if rest else f"all {plural(len(ratios_of), 'motion')}"
     where = clip(ratios_of[0][0].case, 40) if len(ratios_of) == 1 else where
     low, high = (f"{ratio:.0f}" if ratio >= 100 else f"{ratio:.1f}" for ratio in (min(ratios), max(ratios)))
     times = low if low == high else f"{low} to {high}"

@@ -177,8 +177,8 @@ def _length_of_step(coefficients: Any, order: int) -> float:
 def _require(agrees: bool, what: str, precision: Precision) -> None:
     if not agrees:
         raise Contradiction(
-            f"A compiled integrator for {precision.name} gives a wrong value in a step that is known: {what}.",
-            "Its machine code is damaged: run again; if it stays, this machine or heyoka is faulty.",
+            f"A compiled integrator for {precision.name} failed its check against a known step: {what} is wrong.",
+            "Its machine code is damaged: run again. If the error persists, this machine or heyoka is faulty.",
         )
 
 
@@ -283,7 +283,7 @@ def build(
     """A new integrator, checked; the arguments: as in :func:`compiled`."""
     require(precision)
     if precision == DOUBLE_DOUBLE:
-        raise InputError("heyoka has no double-double.", "Use the integrator multiword for it, or quad.")
+        raise InputError("heyoka does not support double-double.", "Use the integrator multiword for it, or quad.")
     if constants is not None and precision != DOUBLE:
         raise InputError(f"Constants cannot be compiled in for {precision.name}.", "Use double.")
     heyoka = import_heyoka()

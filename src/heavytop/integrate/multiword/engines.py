@@ -62,8 +62,8 @@ def check(system: System, attitude: bool, begin: Callable[[Scaled], Steps], bits
 def _require(agrees: bool, what: str, bits: int) -> None:
     if not agrees:
         raise Contradiction(
-            f"Machine code in {bits} bits gives a wrong value in a step that is known: {what}.",
-            "It is damaged: run again; if it stays, this machine or LLVM is faulty.",
+            f"Machine code in {bits} bits failed its check against a known step: {what} is wrong.",
+            "It is damaged: run again. If the error persists, this machine or LLVM is faulty.",
         )
 
 
@@ -160,8 +160,8 @@ def wanted_tolerance(precision: Precision, tolerance: Fraction | None) -> Fracti
     wanted = finest if tolerance is None else tolerance
     if not finest <= wanted <= LOOSEST:
         raise InputError(
-            f"The integrator multiword has no tolerance {decimal_text(wanted, 6)} in {precision.name}.",
-            f"Give one from its eps, {decimal_text(precision.eps, 3)}, to 1e-6, or none.",
+            f"The tolerance of multiword must be from eps to 1e-6; got {decimal_text(wanted, 6)} in {precision.name}.",
+            f"Give one from {decimal_text(precision.eps, 3)} to 1e-6, or none.",
         )
     return wanted
 

@@ -30,7 +30,18 @@ from heavytop.multiword.double_double.double_double_run import BITS, PLACES, Flo
 from heavytop.multiword.fixed_point.arithmetic import Grid
 from heavytop.multiword.fixed_point.fixed_point_run import LONGEST_STEP, Fixed
 from heavytop.multiword.problem import ResumableRun, Scaled, Status
-from heavytop.precision import DOUBLE, Array, OrderedRing, Precision, decimal_text, exact, number, numbers, require
+from heavytop.precision import (
+    DOUBLE,
+    Array,
+    OrderedRing,
+    Precision,
+    decimal_text,
+    exact,
+    number,
+    numbers,
+    require,
+    six_digits,
+)
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import DoubleTimes, HeavyTop, RoundedTimes, State, check_times
 
@@ -130,10 +141,10 @@ def _require_reach(problem: Problem, scaled: Scaled, end: Fraction) -> None:
     fewest = abs(end) * scaled.rate / LONGEST_STEP
     if not scaled.rest and fewest > _TOO_MANY * (expected_steps(problem, end) + _FEW):
         raise OutOfReach(
-            f"A run of multiword in {problem.precision.name} to t = {decimal_text(end, 6)} takes "
-            f"{decimal_text(fewest, 2)} steps or more: they are as short as if all the energy were in a spin about the "
-            "axis of the least moment.",
-            "Use double-double or heyoka, whose steps follow the motion, or limit the steps.",
+            f"A run of multiword in {problem.precision.name} to t = {six_digits(end)} takes at least "
+            f"{decimal_text(fewest, 2)} steps: its step size allows for all the energy in a rotation about the axis of "
+            "least inertia.",
+            "Use double-double or heyoka, which adapt the step size, or limit the steps.",
         )
 
 

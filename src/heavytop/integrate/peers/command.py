@@ -31,7 +31,7 @@ import numpy
 
 from heavytop.errors import InputError, PeerFailed, Unsupported, argument
 from heavytop.guard import Guard, how_it_ended, stopwatch, waited_for_processor
-from heavytop.integrate.peers.contract import DEFAULT_STEP, Declared, of_quaternion, quaternion, said
+from heavytop.integrate.peers.contract import DEFAULT_STEP, Declared, of_quaternion, quaternion, require_control, said
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number, rounded, vector
 from heavytop.records import UNRESOLVED_SECONDS
@@ -115,7 +115,10 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         top = (problem.given or (problem.top, problem.start))[0]
         body = Body.realising(top) if self.bodies else None
         if self.bodies and body is None:
-            raise Unsupported(f"{self.name} needs a body, and none has these moments.", "`heavytop list` marks bodies.")
+            raise Unsupported(
+                f"{self.name} needs a rigid body, and no rigid body has these moments.",
+                "`heavytop list` marks the cases that are rigid bodies.",
+            )
         return ProgramRequest(problem, times, setting, self.hex, self.attitude == "quaternion", body)
 
     def load(self) -> Callable[..., Trajectory]:
@@ -168,15 +171,13 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         for name in settings:
             if name != control:
                 remedy = f"Leave it out: {argument(control)} sets its accuracy." if control else "Leave it out."
-                raise InputError(f"The integrator {self.name} has no {argument(name)}.", remedy)
+                raise InputError(f"The integrator {self.name} does not support {argument(name)}.", remedy)
         if not control:
             return None
         value = settings.get(control)
         if value is None:
             return self.default(precision)
-        if value <= 0 or (control == "tolerance" and value > 1):
-            limits = "above 0" if control == "step" else "above 0, up to 1"
-            raise InputError(f"{self.name} cannot use the {control} {decimal_text(value, 6)}.", f"Give {limits}.")
+        require_control(self.name, control, value)
         return rounded(value, precision)
 
     def default(self, precision: Precision) -> Fraction | None:

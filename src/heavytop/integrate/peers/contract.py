@@ -29,7 +29,7 @@ import numpy
 from heavytop.errors import HeavyTopError, InputError, PeerFailed, Unsupported
 from heavytop.guard import stopwatch
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.precision import DOUBLE, Precision, Vector, cross, decimal_text, dot, exact, number, rounded
+from heavytop.precision import DOUBLE, Precision, Vector, cross, decimal_text, dot, exact, number, rounded, six_digits
 from heavytop.top.attitude import near_quaternion, perpendicular, rotation_of, rows_of
 from heavytop.top.equations import HEAVY_TOP, NAMES, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -175,9 +175,9 @@ class Declared:
         if self.is_singular(start.gamma):
             raise Unsupported(f"{name} declares that its coordinates are singular at this start.", "Give another γ.")
         if self.attitude == "quaternion" and abs(dot(start.gamma, start.gamma) - 1) > _OFF_SPHERE:
-            raise Unsupported(f"{name} computes with a quaternion, and |γ| is not 1.", "Give a γ of length 1.")
+            raise Unsupported(f"{name} computes with a quaternion, which needs |γ| = 1.", "Give a γ of length 1.")
         if xi is not None and not self.attitude:
-            raise Unsupported(f"{name} declares that it does not carry the attitude.", "Ask for no attitude.")
+            raise Unsupported(f"{name} declares that it does not carry the attitude.", "Do not request the attitude.")
         direction = "backward" if end < 0 else "forward"
         generic = f"{precision.family}:BITS"
         requirements = (
@@ -188,7 +188,7 @@ class Declared:
         for what, value, declared, names in requirements:
             if declared is not None and not set(names) & set(declared):
                 can = ", ".join(declared) or "none"
-                raise Unsupported(f"{name} declares that it cannot do {what} {value}.", f"It can do: {can}.")
+                raise Unsupported(f"{name} declares that it does not support {what} {value}.", f"It supports: {can}.")
 
     def is_singular(self, gamma: Vector) -> bool:
         """Whether its coordinates are singular at that γ."""
@@ -206,9 +206,8 @@ class Declared:
         fitted = spacing / ceil(spacing / step)
         if _FINER * fitted < step:
             raise Unsupported(
-                f"{name} declares that its steps are all equal, and these times are no multiples of a step near "
-                f"{decimal_text(step, 6)}.",
-                "Ask for evenly spread times.",
+                f"{name} declares equal steps, and these times are not multiples of a step near {six_digits(step)}.",
+                "Give equally spaced times.",
             )
         return fitted
 
@@ -238,6 +237,13 @@ def of_quaternion(name: str, problem: Problem, state: Sequence[Any]) -> Any:
 
 Run = Callable[[Problem, Sequence[Fraction], Fraction | None], Trajectory]
 """A problem in its format, times, and a tolerance or None for the peer's own."""
+
+
+def require_control(name: str, control: str, value: Fraction) -> None:
+    """Raise InputError for a step or tolerance that is not positive, and for a tolerance above 1."""
+    if value <= 0 or (control == "tolerance" and value > 1):
+        rule = "above 0" if control == "step" else "above 0, up to 1"
+        raise InputError(f"The {control} of {name} must be {rule}; got {six_digits(value)}.", f"Give one {rule}.")
 
 
 def with_tolerance(run: Run) -> Callable[..., Trajectory]:
@@ -421,5 +427,5 @@ def require_equal(name: str, one: Trajectory, other: Trajectory) -> None:
         ):
             if values[0] != values[1]:
                 first, second = (decimal_text(value, 17) for value in values)
-                where = f"{component} at t = {decimal_text(time, 6)}"
+                where = f"{component} at t = {six_digits(time)}"
                 raise PeerFailed(f"{name} returned {first} and {second} as {where} in two equal calls")

@@ -15,10 +15,17 @@ import numpy
 
 from heavytop import precision as vectors
 from heavytop.errors import InputError, PeerFailed, Unsupported, quoted
-from heavytop.integrate.peers.contract import DEFAULT_STEP, Declared, of_quaternion, quaternion, with_tolerance
+from heavytop.integrate.peers.contract import (
+    DEFAULT_STEP,
+    Declared,
+    of_quaternion,
+    quaternion,
+    require_control,
+    with_tolerance,
+)
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.multiword.codegen.machine_code import Doubles
-from heavytop.precision import DOUBLE, OncePerArguments, Precision, decimal_text, exact, number
+from heavytop.precision import DOUBLE, OncePerArguments, Precision, exact, number
 from heavytop.top.attitude import matrix_of_quaternion
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State, check_times
@@ -143,9 +150,9 @@ def double_peer(
     """
     singular = tuple(vectors.vector(point, "singular_at") for point in singular_at)
     if attitude not in (False, True, "quaternion"):
-        raise InputError(f"attitude = {quoted(attitude)} declares nothing.", 'Give True, False or "quaternion".')
+        raise InputError(f'attitude must be True, False or "quaternion"; got {quoted(attitude)}.', "Give one of these.")
     if fixed_grid and control != "step":
-        raise InputError("fixed_grid declares that all steps are equal.", 'Give control = "step" too.')
+        raise InputError('fixed_grid needs control = "step".', "Give both, or neither.")
     able = (_declared(systems), _declared(directions), _declared(precisions))
     declared = Declared(*able, attitude, one_step, fixed_grid, singular)
 
@@ -206,16 +213,16 @@ def fixed_steps(
 
 def _declared(names: Sequence[str] | None) -> tuple[str, ...] | None:
     if names is not None and (isinstance(names, str) or not all(isinstance(name, str) for name in names)):
-        raise InputError(f"{quoted(names)} declares nothing.", 'Give a list of names such as ["heavy_top"], or None.')
+        raise InputError(
+            f"Declared capabilities must be lists of names; got {quoted(names)}.", 'Give, for example, ["heavy_top"].'
+        )
     return None if names is None else tuple(names)
 
 
 def _request(name: str, control: str, problem: Problem, times: Sequence[Fraction], value: Fraction) -> Request:
     if problem.precision != DOUBLE:
-        raise Unsupported(f"{name} has no {problem.precision.name}.", "Use double.")
-    if value <= 0 or (control == "tolerance" and value > 1):
-        limits = "between 0 and 1" if control == "tolerance" else "above 0"
-        raise InputError(f"{name} cannot use the {control} {decimal_text(value, 6)}.", f"Give one {limits}.")
+        raise Unsupported(f"{name} does not support {problem.precision.name}.", "Use double.")
+    require_control(name, control, value)
     grid = numpy.array([number(time, DOUBLE) for time in check_times(times)])
     numbers = numpy.array(problem.native(problem.parameters.numbers), dtype=float)
     start = numpy.array(problem.native((*problem.start.flat, *(problem.xi or ()))))

@@ -38,7 +38,7 @@ LANES = 8
 def lanes(problem: Problem, times: Sequence[Fraction], tolerance: Fraction | None) -> Trajectory:
     """The motion in one of eight SIMD lanes of one thread, the same in each; ``run`` is an eighth of their seconds."""
     if problem.precision != DOUBLE:
-        raise Unsupported(f"heyoka:lanes has no {problem.precision.name}.", "Use double.")
+        raise Unsupported(f"heyoka:lanes does not support {problem.precision.name}.", "Use double.")
     began = perf_counter()
     run = propagate_ensemble([problem] * LANES, times, threads=1, lanes=LANES, tolerance=tolerance)[0]
     share = (perf_counter() - began) / LANES

@@ -28,7 +28,7 @@ def odefun(problem: Problem, times: Sequence[Fraction], tolerance: Fraction | No
     precision, system = problem.precision, problem.system
     grid = [rounded(time, precision) for time in check_times(times)]
     if grid[-1] < 0:
-        raise InputError("mpmath.odefun integrates forwards only.", "Give positive times.")
+        raise InputError("mpmath.odefun integrates only forward in time.", "Give positive times.")
     evaluations = 0
     began = perf_counter()
     # a new context, for that of the module is shared by all threads

@@ -48,10 +48,12 @@ class Tableau:
     def __post_init__(self) -> None:
         lengths, wanted = [len(row) for row in self.a], list(range(1, len(self.b)))
         if lengths != wanted:
-            raise InputError(f"The rows of a have the lengths {lengths}.", f"Give {wanted}: as many stages as weights.")
+            raise InputError(
+                f"The rows of a have wrong lengths: {lengths}.", f"Give {wanted}: as many stages as weights."
+            )
         total = sum(map(float, self.b))
         if abs(total - 1) > len(self.b) * 2.0**-52:
-            raise InputError(f"The weights add up to {total}.", "Give weights b that add up to 1.")
+            raise InputError(f"The weights b must sum to 1; got {total}.", "Correct the weights.")
 
     def peer(self, name: str) -> Callable[..., Trajectory]:
         """The method as a peer, which carries the attitude."""

@@ -45,8 +45,8 @@ class PythonFile:
         except AttributeError:
             functions = (item for item in vars(module).values() if inspect.isfunction(item))
             defined = [item.__name__ for item in functions if item.__module__ == module.__name__]
-            remedy = f"{meant(self.function, defined)}It has {', '.join(defined) or 'no function'}."
-            raise NoSuchFunction(f"{self.path} has no {self.function}.", remedy) from None
+            remedy = f"{meant(self.function, defined)}It defines {', '.join(defined) or 'no function'}."
+            raise NoSuchFunction(f"{self.path} does not define {self.function}.", remedy) from None
         return as_peer(call, self.name)
 
 
@@ -114,7 +114,7 @@ def _module(path: Path, state: tuple[int, int]) -> Any:
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # whatever a user's file does when it is run
-        raise InputError(f"{path} is broken: {type(error).__name__}: {said(error)}.", "Mend it.") from error
+        raise InputError(f"{path} is broken: {type(error).__name__}: {said(error)}.", "Correct it.") from error
     _modules[path] = state, module
     return module
 

@@ -6,6 +6,7 @@ from typing import Any, Protocol
 
 import msgspec
 
+from heavytop.display import plural
 from heavytop.integrate.trajectory import Outcome
 from heavytop.records import Identity
 
@@ -60,7 +61,7 @@ class WorseMotions(msgspec.Struct, frozen=True):
             return f"The motions of {name} are not compared one by one: {self.reason}."
         if not self.worse:
             return ""
-        return f"{self.worse} of {self.joined} motions of {name} got worse; {self.first[0].text}."
+        return f"{self.worse} of {plural(self.joined, 'motion')} of {name} got worse; {self.first[0].text}."
 
     def to_json(self) -> dict[str, Any]:
         """An entry of the surveys of `compare --json`."""

@@ -44,7 +44,7 @@ def summary(report: Report, kinds: Kinds) -> RenderableType:
         parts += [Text(), *_shown([block for block in blocks if not isinstance(block, Headline)])]
     others = Counter(row.key.kind for row in report.rows if row.outcome not in UNMEASURED and row.key.kind not in kinds)
     unlisted = [
-        f"Measure {name or 'without a name'}: {count} rows, which the page lists (--html FILE)"
+        f"Measure {name or 'without a name'}: {count} rows; the page lists them (--html FILE)"
         for name, count in others.items()
     ]
     for sentence in filter(None, [*unlisted, unsupported(report.rows)]):

@@ -478,7 +478,7 @@ def of_file(requested: System | None, written: str | None, default: System) -> S
     of_claim = None if written is None else system(written)
     if requested is not None and of_claim is not None and requested is not of_claim:
         cause = f"The file is about {of_claim.name}, but {requested.name} was asked for."
-        raise InputError(cause, "Ask for that of the file, or none.")
+        raise InputError(cause, "Give the system of the file, or none.")
     return requested or of_claim or default
 
 

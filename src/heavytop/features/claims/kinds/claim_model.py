@@ -340,7 +340,7 @@ def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[errors_o
         (computed,) = compute([partial(Problem.of, known.top, known.start, xi=CLAIM_XI)], times, bits)
         return computed.state, computed.against
     if proven is None:
-        raise OutOfReach(f"{known.method} is not certified to {bits} bits.", "Ask for earlier times.")
+        raise OutOfReach(f"{known.method} is not certified to {bits} bits.", "Give earlier times.")
     return cache(partial(_state_and_attitude, known)), proven.against
 
 

@@ -13,7 +13,7 @@ from typing import Any
 from flint import arb
 
 from heavytop import written_numbers
-from heavytop.errors import InputError, prefixed, quoted
+from heavytop.errors import InputError, prefixed, quoted, require_as_many
 from heavytop.exact.flint.balls import midpoint, working_precision
 from heavytop.features.score.trajectories.logs import canonical, of_rodrigues, of_rotation_vector, with_quaternion
 from heavytop.features.score.trajectories.observed import RawStart
@@ -530,8 +530,7 @@ def _of_lists(document: Mapping[str, Any], convention: Convention) -> ColumnTabl
     times = document.get("times")
     if isinstance(times, list):
         for key, count in counts.items():
-            if count != len(times):
-                raise InputError(f"There are {len(times)} times and {count} {key}.", "Give one row for each time.")
+            require_as_many(key, count, len(times))
     values = {}
     for name in WIDTHS:
         if name in columns:

@@ -35,7 +35,7 @@ from heavytop.features.score.trajectories.observed import (
 from heavytop.files import read_whole, readable, without_repeats
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.attitude_error import WIDTHS
-from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, Vector, decimal_text, exact_text, parse, real, shown
+from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, Vector, exact_text, parse, real, shown, six_digits
 from heavytop.top.attitude import SHAPES, key_of
 from heavytop.top.bodies import BODY, CENTRE, Body, body_of
 from heavytop.top.equations import NAMES, VARIABLES, System, system_of
@@ -316,7 +316,7 @@ def _other(case: Case, what: str, new: str, old: str) -> InputError:
 
 
 def _briefly(value: Fraction) -> str:
-    return str(value) if value.denominator < 1000 else decimal_text(value, 6)
+    return str(value) if value.denominator < 1000 else six_digits(value)
 
 
 _FLAGS = ("language", "tolerance", "step")

@@ -291,7 +291,7 @@ def of_ephemeris(text: str) -> str:
     Raises InputError for several segments, another kind of attitude, and an invalid epoch.
     """
     if text.count("META_START") != 1:
-        raise InputError(f"The message has {text.count('META_START')} segments.", "Give one.")
+        raise InputError(f"The message must have one segment; got {text.count('META_START')}.", "Give one segment.")
     meta = dict(re.findall(r"^\s*([A-Z_]+)\s*=\s*(.*?)\s*$", text, re.MULTILINE))
     kind = meta.get("ATTITUDE_TYPE", "").upper()
     if kind not in _KINDS:
@@ -363,7 +363,9 @@ def of_arrays(content: bytes, suffix: str) -> str:
             names.append(name)
     if not parts or len({len(part) for part in parts}) != 1:
         counts = ", ".join(str(len(part)) for part in parts) or "none"
-        raise InputError(f"The arrays have {counts} rows.", "Give arrays of one length, one row for each time.")
+        raise InputError(
+            f"The arrays must have equally many rows, at least 1; got {counts}.", "Give one row for each time."
+        )
     rows = [",".join(repr(value) for part in parts for value in part[i].tolist()) for i in range(len(parts[0]))]
     return "\n".join([*comments, ",".join(names), *rows])
 
@@ -442,5 +444,5 @@ def _names_of(name: str, width: int, scalar_last: bool) -> list[str]:
         return [{"times": "t", "time": "t"}.get(name, name)]
     plain = {"positions": "p", "position": "p", "pos": "p", "gammas": "gamma"}.get(name, name)
     if not name:
-        raise InputError(f"The array has {width} columns.", "Give t, omega1 to omega3, gamma1 to gamma3: seven.")
+        raise InputError(f"The array must have 7 columns; got {width}.", "Give t, omega1 to omega3, gamma1 to gamma3.")
     return [f"{plain}{'xyz'[i] if plain == 'p' else i + 1}" for i in range(width)]

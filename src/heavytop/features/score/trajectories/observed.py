@@ -13,7 +13,7 @@ import numpy
 
 from heavytop import written_numbers
 from heavytop.arguments import MOST_STATES, bits_of, component
-from heavytop.errors import InputError, prefixed
+from heavytop.errors import InputError, prefixed, require_as_many
 from heavytop.features.score.diagnose.readings import GivenStart, Observations, Reading, body_data
 from heavytop.features.score.diagnose.samples import floats
 from heavytop.integrate.trajectory import Outcome
@@ -28,6 +28,7 @@ from heavytop.precision import (
     number,
     round_to,
     shown,
+    six_digits,
 )
 from heavytop.top.attitude import Angle, Attitude, multiple_of_quaternion, perpendicular, rotated, rotation_of
 from heavytop.top.bodies import CENTRE, IDENTITY, Body
@@ -156,7 +157,7 @@ def rotation(raw: RawStart, convention: Convention, precision: Precision, normal
 
 
 def _list(values: Sequence[Fraction]) -> str:
-    return ", ".join(decimal_text(value, 6) for value in values)
+    return ", ".join(six_digits(value) for value in values)
 
 
 def _of_gamma(raw: RawStart, slack: Fraction, normalize: bool) -> Rows:
@@ -192,7 +193,7 @@ def require_rotation(form: str, values: Sequence[Fraction], slack: Fraction, wha
         off = dot((*values[:3],), (*values[:3],)) + values[3] ** 2 - 1
         if abs(off) > 2 * slack:
             raise InputError(
-                f"{what} must have length 1; |q|^2 - 1 = {decimal_text(off, 6)}.",
+                f"{what} must have length 1; |q|^2 - 1 = {six_digits(off)}.",
                 "Divide it by its length, or use --normalize (normalize=True in Python).",
             )
     if form == "matrix":
@@ -206,12 +207,12 @@ def require_matrix(rows: Sequence[Sequence[Fraction]], slack: Fraction, what: st
     off = max(products, key=abs)
     if determinant < 0 and abs(off) <= _FAR:
         raise InputError(
-            f"{what} is a reflection, not a rotation: its determinant is {decimal_text(determinant, 6)}.",
+            f"{what} is a reflection, not a rotation: its determinant is {six_digits(determinant)}.",
             "These are left-handed axes: reverse one axis of space or of the body.",
         )
     if abs(off) > 2 * slack:
         raise InputError(
-            f"{what} is not orthogonal: R R^T is off the unit matrix by {decimal_text(off, 6)}.",
+            f"{what} is not orthogonal: R R^T is off the unit matrix by {six_digits(off)}.",
             "Write all its digits, or use --normalize (normalize=True in Python), which takes the rotation next to it.",
         )
 
@@ -312,8 +313,7 @@ def of_arrays(
 
 def require_states(times: list[Fraction], rows: list[Any]) -> None:
     """Raises InputError unless there are as many states as times, and not too many."""
-    if len(rows) != len(times):
-        raise InputError(f"There are {len(times)} times and {len(rows)} states.", "Give one state for each time.")
+    require_as_many("states", len(rows), len(times))
     if len(times) > MOST_STATES:
         raise too_many(len(times))
 
