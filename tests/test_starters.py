@@ -70,7 +70,7 @@ def test_a_folder_is_complete_and_works_at_once_where_its_compiler_is_there(lang
         assert (turned[:, :6] == run).all()
         found = {each.check: each for each in check(command)}
         assert [name for name, each in found.items() if each.verdict != "kept"] == ["huge"]
-        assert found["attitude"].text == "It carries the attitude."
+        assert found["attitude"].text == "The attitude agrees with the reference."
     finally:
         close_all()
 

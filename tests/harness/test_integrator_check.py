@@ -48,8 +48,8 @@ def solve(given):
 @pytest.mark.parametrize(
     ("fault", "part", "verdict", "said"),
     [
-        ("while abs(given.start[0]) > 1e9: time.sleep(0.1)", "huge", "note", "within 1 s; its process was ended"),
-        ("if len(given.times) > 100: time.sleep(600)", "many times", "violated", "within 1 s; its process was ended"),
+        ("while abs(given.start[0]) > 1e9: time.sleep(0.1)", "huge", "note", "within 1 s; the process was stopped"),
+        ("if len(given.times) > 100: time.sleep(600)", "many times", "violated", "within 1 s; the process was stopped"),
         ("if len(given.times) > 100: os._exit(1)", "many times", "violated", "It ended its whole process."),
         ("if len(given.times) > 100: raise KeyboardInterrupt", "many times", "violated", "by KeyboardInterrupt."),
     ],
@@ -131,7 +131,7 @@ def test_an_attitude_that_is_lost_later_is_seen(tmp_path: Path) -> None:
         contract = integrator_check._Contract(named(f"{tmp_path / 'mine.py'}:solve"))
         part = integrator_check._judged("attitude", contract._attitude)
         assert part.verdict == "violated"
-        assert "With the attitude its state at t = " in part.text
+        assert "The error with the attitude is " in part.text
 
 
 def test_a_function_that_a_file_does_not_have_is_no_violation(tmp_path: Path) -> None:

@@ -76,13 +76,13 @@ FAILURES = {
 }
 DIAGNOSED = {
     "six digits": ("digits", "Its numbers have 6 significant digits: double takes 17."),
-    "single precision": ("digits", "Its numbers have 24 bits, those of double 53."),
-    "wrong backwards": ("backwards", "its steps back in time are wrong"),
+    "single precision": ("digits", "States have 24 bits; double has 53."),
+    "wrong backwards": ("backwards", "steps backward in time are wrong"),
     "swapped": ("one time", "look at the order of the components"),
     "other each time": ("determinism", "The same request twice gives two answers"),
     "knows too little": ("unknown lines", "It does not ignore a line that it does not know"),
     "ignores quit": ("quit", "It does not end within 0.2 s of quit"),
-    "outlives its input": ("end of input", "It does not end within 0.2 s of the end of its input"),
+    "outlives its input": ("end of input", "The program does not exit within 0.2 s of end of input"),
 }
 SILENT = {name for name, text in FAILURES.items() if "within 1 s" in text}
 
@@ -156,8 +156,8 @@ def test_a_right_program_keeps_the_contract_and_one_process_serves_it() -> None:
 @pytest.mark.parametrize(
     ("fault", "part", "text"),
     [
-        ("begins badly", "restart", "which its error explains. Where it keeps a memory, declare one_step = false."),
-        ("counts wrongly", "steps", "It counts 2000 steps to t = 2, where steps of 0.01 are 200. Perhaps"),
+        ("begins badly", "restart", "which the error explains. A multistep method should declare one_step = false."),
+        ("counts wrongly", "steps", "2000 steps counted to t = 2; the step size 0.01 needs 200. Perhaps"),
     ],
 )
 def test_what_a_right_program_may_do_is_a_note(fault: str, part: str, text: str) -> None:

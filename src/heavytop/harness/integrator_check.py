@@ -67,7 +67,7 @@ _DENSE_RATIO = 30
 _LEAST_DENSE_ORDER, _ORDER_MARGIN = 2.5, 0.5
 """Least order of the dense output, and its allowed gap below the method's; linear interpolation has 2."""
 NOT_TRIED = (
-    "Not tried here: its accuracy, its order, its seconds, answers kept from earlier calls. A plan measures these: "
+    "Not tested here: accuracy, order, run time, and states kept from earlier calls. A plan measures these: "
     "heavytop run --plan gate --integrator NAME."
 )
 _CASES = {"heavy_top": "generic", "gyrostat": "gyrostat", "heavy_gyrostat": "heavy-gyrostat"}
@@ -117,7 +117,7 @@ def _checks(which: str | IntegratorSource, process: GuardedProcess | None) -> It
         checked, ended = (_part(which, index), False) if process is None else _in_child(process, which, index, name)
         yield checked
         if checked.verdict == "violated" and (ended or index < _FIRST):
-            yield Checked("rest of the contract", "note", "Nothing else was tried: mend that first.")
+            yield Checked("rest of the contract", "note", "Not tested, because of the violation above.")
             return
 
 
@@ -133,10 +133,10 @@ def _in_child(process: GuardedProcess, which: str | IntegratorSource, index: int
         if isinstance(error, HeavyTopError | BrokenProcessPool):
             raise error
         cause = ": ".join(filter(None, (type(error).__name__, said(error))))
-        return Checked(name, "violated", f"It left its process by {cause}."), True
+        return Checked(name, "violated", f"It left its process: {cause}."), True
     except TimeoutError:
         process.kill()
-        text = f"It does not answer within {seconds:g} s; its process was ended."
+        text = f"No answer within {seconds:g} s; the process was stopped."
         if name == _TOO_FAST:
             return Checked(name, "note", f"{_HUGE_REQUEST}: {text}"), True
         return Checked(name, "violated", text), True
@@ -197,10 +197,10 @@ class _Contract:
         """The name of each part, and its check."""
         parts: list[tuple[str, Callable[[], str]]] = [
             ("start", self._starts),
-            ("one time", partial(self._plain, "At t = 1 it")),
+            ("one time", self._plain),
             ("times [0]", self._start_alone),
             ("times [0, 1]", self._start_and_one),
-            ("many times", partial(self._plain, "At 1000 times up to t = 2 it", _MANY)),
+            ("many times", partial(self._plain, " with 1000 samples", _MANY)),
             ("digits", self._digits),
             ("determinism", self._same_twice),
             ("restart", self._restart),
@@ -209,16 +209,16 @@ class _Contract:
             ("steps", self._steps),
             ("between steps", self._between_steps),
             ("attitude", self._attitude),
-            *((f"format {p.name}", partial(self._plain, f"In {p.name} it", precision=p)) for p in self.precisions[1:]),
+            *((f"format {p.name}", partial(self._plain, f" in {p.name}", precision=p)) for p in self.precisions[1:]),
             *(
-                (f"system {name}", partial(self._plain, f"As a {name} it", case=CASES[_case(name)]))
+                (f"system {name}", partial(self._plain, f" of the {name}", case=CASES[_case(name)]))
                 for name in self.systems[1:]
             ),
         ]
         if self.program:
             parts += [("unknown lines", self._unknown_lines), ("two processes", self._two_at_once)]
         parts.append((_TOO_FAST, self._huge))
-        ends = {"quit": (b"quit\n", "quit"), "end of input": (b"", "the end of its input")} if self.program else {}
+        ends = {"quit": (b"quit\n", "quit"), "end of input": (b"", "the end of input")} if self.program else {}
         return parts + [(name, partial(self._ended_by, *how)) for name, how in ends.items()]
 
     def _run(
@@ -235,7 +235,7 @@ class _Contract:
         problem = (top or self.top, start or self.start, instants, precision or self.precision)
         run = registry.ready(self.which)(*problem, system=system or self.system, **more)
         if run.outcome is not Outcome.SUCCESS:
-            raise _Violated(f"It ends as {run.outcome.value} at t = {six_digits(run.time_reached)}.")
+            raise _Violated(f"The run ended as {run.outcome.value} at t = {six_digits(run.time_reached)}.")
         return run
 
     def _starts(self) -> str:
@@ -245,13 +245,13 @@ class _Contract:
         with session(self.program) as program:
             greeting = program.greeting
         if len(greeting.split()) < 2:
-            raise _Note(f"It says ready {greeting}".rstrip() + " without a version: ready NAME VERSION.")
-        return f"It says that it is {greeting}."
+            raise _Note(f"The greeting must be ready NAME VERSION; got ready {greeting}".rstrip() + ".")
+        return f"Name and version: {greeting}."
 
-    def _plain(self, subject: str, times: Sequence[int | Fraction] = (1,), case: Any = None, **more: Any) -> str:
+    def _plain(self, where: str = "", times: Sequence[int | Fraction] = (1,), case: Any = None, **more: Any) -> str:
         """Checks a run of a case against the reference."""
         problem = {} if case is None else {"start": case.start, "top": case.top, "system": case.system}
-        return self._right(self._run(times, **problem, **more), subject, case)
+        return self._right(self._run(times, **problem, **more), where, case)
 
     def _start_alone(self) -> str:
         try:
@@ -259,47 +259,47 @@ class _Contract:
         except PeerFailed as error:
             if self.program and not error.answered:
                 raise
-            raise _Note(f"A run to t = 0 it refuses, as it may: {_cause(error)}.") from None
-        return f"Asked for t = 0 it gives the start{self._off_start(run.states[0])}."
+            raise _Note(f"A run to t = 0 is refused, which is allowed: {_cause(error)}.") from None
+        return f"A run to t = 0 returns the start{self._off_start(run.states[0])}."
 
     def _start_and_one(self) -> str:
         run = self._run([0, 1])
         self._off_start(run.states[0])
-        return self._right(run, "Asked for t = 0 and 1 it")
+        return self._right(run, " with samples at t = 0 and 1")
 
     def _digits(self) -> str:
         values = [exact(value) for state in self._run([1, 2, 3]).states for value in state]
         for digits in range(1, self.precision.digits - 1):
             if all(rounded(Fraction(decimal_text(v, digits)), self.precision) == v for v in values):
                 needed = self.precision.digits
-                raise _Violated(f"Its numbers have {digits} significant digits: {self.precision.name} takes {needed}.")
+                raise _Violated(f"States have {digits} significant digits; {self.precision.name} has {needed}.")
         for bits in (24, 53, 64):
             if bits < self.precision.bits and all(round_to(value, bits) == value for value in values):
-                raise _Violated(f"Its numbers have {bits} bits, those of {self.precision.name} {self.precision.bits}.")
-        return "Its numbers have all the digits of the format."
+                raise _Violated(f"States have {bits} bits; {self.precision.name} has {self.precision.bits}.")
+        return "States have all digits of the format."
 
     def _same_twice(self) -> str:
         first, second = (self._run([1, 2]).texts() for _ in range(2))
         if first != second:
-            raise _Violated("The same request twice gives two answers: it keeps something, or depends on the clock.")
-        return "The same request twice gives the same bits."
+            raise _Violated("Equal requests give different states: it keeps results between calls, or uses the clock.")
+        return "Equal requests give equal bits."
 
     def _restart(self) -> str:
         if self.system is GYROSTAT:
-            raise _Note(f"Not tried: a {self.system.name} does not start anew from rounded data.")
+            raise _Note(f"Not tested: a {self.system.name} cannot be restarted from rounded data.")
         uninterrupted, first_half = self._run([2]), self._run([1])
         values = [exact(value) for value in first_half.states[-1]]
         second_half = self._run([1], State(values[:3], values[3:]), first_half.problem.top, system=self.system)
         gap, eps = _distance(uninterrupted.states[-1], second_half.states[-1]), self.precision.eps
         if gap <= _RESTART_EPS * eps:
-            return f"A run that starts anew at t = 1 ends as one that does not, within {_RESTART_EPS} eps."
-        differ = f"A run to t = 2 and one that starts anew at t = 1 differ by {decimal_text(gap / eps, 2)} eps"
+            return f"A restart at t = 1 changes the run by at most {_RESTART_EPS} eps."
+        differ = f"A restart at t = 1 changes the state at t = 2 by {float(gap / eps):.2g} eps"
         error = self._error(uninterrupted)
         if gap > _ERROR_MULTIPLE * error:
-            raise _Violated(f"{differ}, {decimal_text(gap / error if error else gap, 2)} times the error of the first.")
+            raise _Violated(f"{differ}, {float(gap / error if error else gap):.2g} times the error without it.")
         if self.declared.one_step and registry.control_name(self.which) == "step":
-            raise _Note(f"{differ}, which its error explains. Where it keeps a memory, declare one_step = false.")
-        return f"{differ}, which its error explains."
+            raise _Note(f"{differ}, which the error explains. A multistep method should declare one_step = false.")
+        return f"{differ}, which the error explains."
 
     def _error(self, run: Trajectory) -> Fraction:
         """The largest error of the states of a run, in units of their largest component."""
@@ -309,9 +309,9 @@ class _Contract:
 
     def _backwards(self) -> str:
         if self.program and set(self.program.directions) != {"forward", "backward"}:
-            return f"It declares {self.program.directions[0]} alone."
+            return f"It declares direction {self.program.directions[0]} only."
         back = self._run([-1])
-        sentence = self._right(back, "At t = -1 it")
+        sentence = self._right(back)
         if self.system is HEAVY_TOP:
             self._require_as_right(back)
         return sentence
@@ -324,8 +324,8 @@ class _Contract:
         error, mirror_error = _distance(back.states[-1], reference), _distance(mirrored, reference)
         if error > _RESTART_EPS * self.precision.eps + _BACKWARD_RATIO * mirror_error:
             raise _Violated(
-                f"At t = -1 it is off by {decimal_text(error, 2)}, and from (−Ω, γ) forwards, which is the same "
-                f"motion, by {decimal_text(mirror_error, 2)}: its steps back in time are wrong."
+                f"The error at t = -1 is {float(error):.2g}, and that of the same motion forward in time, from "
+                f"(−Ω, γ), is {float(mirror_error):.2g}: steps backward in time are wrong."
             )
 
     def _rest(self) -> str:
@@ -334,45 +334,45 @@ class _Contract:
         displacement = max(_distance(state, (0, 0, 0, *self.axis)) for state in run.states)
         if displacement <= _RESTART_EPS * self.precision.eps:
             return "A top at rest stays at rest."
-        moved = f"A top at rest moves by {decimal_text(displacement, 2)} until t = 10"
+        moved = f"A top at rest moves by {float(displacement):.2g} until t = 10"
         if displacement > _ERROR_MULTIPLE * self._error(self._run([10])):
             raise _Violated(f"{moved}.")
-        raise _Note(f"{moved}, which its error on a motion explains.")
+        raise _Note(f"{moved}, which the error on a motion explains.")
 
     def _steps(self) -> str:
         run = self._run([Fraction(1, 2), 2])
         if run.flags.get("steps") == "not counted":
-            return "It does not count its steps, so single steps are not measured."
+            return "Steps are not counted, so single steps are not measured."
         if run.steps == 0:
-            raise _Violated("It moves, and says that it took no step.")
+            raise _Violated("The state changes, and the step count is 0.")
         step = run.flags.get("step")
         if step is not None and self.program:
             size = exact(step) if "x" not in step else Fraction(1, 100)
             expected = ceil(Fraction(1, 2) / size) + ceil(Fraction(3, 2) / size)
-            text = f"It counts {run.steps} steps to t = 2, where steps of {step} are {expected}."
+            text = f"{run.steps} steps counted to t = 2; the step size {step} needs {expected}."
             if 2 * run.steps < expected:
                 raise _Violated(text)
             if run.steps > expected + 2:
-                raise _Note(f"{text} Perhaps it counts those of a starting method, or parts of a step.")
-        return f"It counts its steps: {run.steps} to t = 2."
+                raise _Note(f"{text} Perhaps stages or steps of a starting method are counted.")
+        return f"{run.steps} steps counted to t = 2."
 
     def _between_steps(self) -> str:
         """Compares the errors between steps with those at the ends of runs, and measures their order in the step."""
         if (control := registry.control_name(self.which)) not in _CONTROLS:
-            raise _Note("Not tried: it is set by nothing.")
+            raise _Note("Not tested: it has neither step nor tolerance.")
         coarse, fine = (self._between(control, value) for value in _CONTROLS[control])
         if fine.between <= max(_DENSE_RATIO * fine.ends, _RESTART_EPS * self.precision.eps):
-            return "At times between steps it is as right as at the ends of its runs."
+            return "Samples between steps are as accurate as the ends of runs."
         errors = (
-            f"At a {control} of {decimal_text(_CONTROLS[control][1], 2)} it is off by {decimal_text(fine.between, 2)} "
-            f"between steps, and by {decimal_text(fine.ends, 2)} where its runs end"
+            f"At a {control} of {float(_CONTROLS[control][1]):.2g} the error between steps is {float(fine.between):.2g}, and "
+            f"at the ends of runs {float(fine.ends):.2g}"
         )
         if fine.steps <= coarse.steps or coarse.between <= fine.between:
             raise _Note(f"{errors}.")
         power = log(float(coarse.between / fine.between)) / log(fine.steps / coarse.steps)
-        text = f"{errors}: between steps its error falls like the power {power:.1f} of the step"
+        text = f"{errors}: between steps it falls like the power {power:.1f} of the step size"
         if power < min(_LEAST_DENSE_ORDER, fine.order - _ORDER_MARGIN):
-            raise _Violated(f"{text}, as that of linear interpolation, and its order is {fine.order}.")
+            raise _Violated(f"{text}, as for linear interpolation, and the order is {fine.order}.")
         raise _Note(f"{text}.")
 
     def _between(self, control: str, value: Fraction) -> _Between:
@@ -383,25 +383,21 @@ class _Contract:
         ]
         for run in runs:
             if run.outcome is not Outcome.SUCCESS:
-                raise _Note(f"At a {control} of {decimal_text(value, 2)} it ends as {run.outcome.value}.")
+                raise _Note(f"At a {control} of {float(value):.2g} the run ended as {run.outcome.value}.")
         dense, *ends = runs
         return _Between(self._error(dense), max(map(self._error, ends)), ends[-1].steps, dense.order)
 
     def _attitude(self) -> str:
         if not described(self.which).carries_attitude:
-            return (
-                "It carries Ω and γ alone: it does not declare that it carries the attitude, and is not asked for it."
-            )
+            return "The attitude is not declared, and was not requested."
         xi = perpendicular(self.start.gamma)
         run = self._run(_ATTITUDE_TIMES, xi=xi)
         reference = propagate(self.top, self.start, list(run.times), DOUBLE, system=self.system, xi=xi)
         for time, state, expected in zip(run.times, run.states, reference.states, strict=True):
             error = _distance(state, expected)
             if error > _LARGEST_ERROR:
-                raise _Violated(
-                    f"With the attitude its state at t = {six_digits(time)} is off by {decimal_text(error, 2)}."
-                )
-        return "It carries the attitude."
+                raise _Violated(f"The error with the attitude is {float(error):.2g} at t = {six_digits(time)}.")
+        return "The attitude agrees with the reference."
 
     def _unknown_lines(self) -> str:
         assert self.program is not None
@@ -413,8 +409,8 @@ class _Contract:
                 if reply.failure:
                     raise PeerFailed(reply.failure)
         except PeerFailed as error:
-            raise _Violated(f"It does not ignore a line that it does not know: {error.cause}.") from None
-        return "It ignores lines that it does not know."
+            raise _Violated(f"An unknown line is not ignored: {error.cause}.") from None
+        return "Unknown lines are ignored."
 
     def _two_at_once(self) -> str:
         assert self.program is not None
@@ -430,8 +426,8 @@ class _Contract:
             for opened in sessions:
                 opened.close()
         if any([list(state) for state in reply.states] != alone for reply in replies):
-            raise _Violated("Two of its processes at once do not answer as one alone: they share something.")
-        return "Two of its processes at once answer as one alone."
+            raise _Violated("Two processes at once do not answer as one alone: they share something.")
+        return "Two processes at once answer as one alone."
 
     def _huge(self) -> str:
         across = (0, _HUGE, 0) if self.axis[0] else (_HUGE, 0, 0)
@@ -446,9 +442,9 @@ class _Contract:
             raise
         except (_Violated, PeerFailed, InputError) as error:
             if self.program and isinstance(error, PeerFailed) and not error.answered:
-                raise PeerFailed(f"{_HUGE_REQUEST} {error.cause}") from None
-            raise _Note(f"{_HUGE_REQUEST} it gives no finite state: {_cause(error)}") from None
-        return f"{_HUGE_REQUEST} it gives finite numbers."
+                raise PeerFailed(f"{_HUGE_REQUEST}: {error.cause}") from None
+            raise _Note(f"{_HUGE_REQUEST}: no finite state ({_cause(error)}).") from None
+        return f"{_HUGE_REQUEST}: finite states."
 
     def _ask(self, command: Command, problem: Problem, seconds: float) -> None:
         """Raises PeerFailed where it returns no state at t = 1 within ``seconds``."""
@@ -467,8 +463,8 @@ class _Contract:
         finally:
             program.close()
         if not ended:
-            raise _Violated(f"It does not end within {_FAREWELL:g} s of {trigger}; its process was killed.")
-        return f"It ends at {trigger}."
+            raise _Violated(f"The program does not exit within {_FAREWELL:g} s of {trigger}; its process was killed.")
+        return f"The program exits at {trigger}."
 
     def _problem(self) -> Problem:
         return Problem.of(self.top, self.start, self.precision, self.system)
@@ -481,20 +477,18 @@ class _Contract:
         """The difference of a state from the start, in words; "" where they are equal bit for bit."""
         difference = _distance(state, self._problem().start.flat) / self.precision.eps
         if difference > _REPRESENTATION_EPS:
-            raise _Violated("At t = 0 it does not give the start that it was given.")
-        return f", as its representation rounds it, within {decimal_text(difference, 2)} eps" if difference else ""
+            raise _Violated("The state at t = 0 is not the start.")
+        return f", within {float(difference):.2g} eps as its representation rounds it" if difference else ""
 
-    def _right(self, run: Trajectory, subject: str, case: Any = None) -> str:
+    def _right(self, run: Trajectory, where: str = "", case: Any = None) -> str:
         top, start = (self.top, self.start) if case is None else (case.top, case.start)
         reference = propagate(top, start, list(run.times), DOUBLE, system=run.problem.system)
         pairs = zip(run.times, run.states, reference.states, strict=True)
         time, error = max(((t, _distance(a, b)) for t, a, b in pairs), key=lambda entry: entry[1])
+        text = f"The error{where} is {float(error):.2g} at t = {six_digits(time)}"
         if error > _LARGEST_ERROR:
-            raise _Violated(
-                f"{subject} is off by {decimal_text(error, 2)} at t = {decimal_text(time, 3)}: "
-                "look at the order of the components, at the signs and at how the parameters are read."
-            )
-        return f"{subject} is right to {decimal_text(error, 2)}." if error else f"{subject} is right to the last bit."
+            raise _Violated(f"{text}: check the order of the components, the signs and how the parameters are read.")
+        return f"{text}."
 
 
 class _Extended(ProgramRequest):
