@@ -364,8 +364,8 @@ class _Contract:
         if fine.between <= max(_DENSE_RATIO * fine.ends, _RESTART_EPS * self.precision.eps):
             return "Samples between steps are as accurate as the ends of runs."
         errors = (
-            f"At a {control} of {float(_CONTROLS[control][1]):.2g} the error is {float(fine.between):.2g} between steps, "
-            f"and {float(fine.ends):.2g} at the ends of runs"
+            f"At a {control} of {float(_CONTROLS[control][1]):.2g} the error is {float(fine.between):.2g} between "
+            f"steps, and {float(fine.ends):.2g} at the ends of runs"
         )
         if fine.steps <= coarse.steps or coarse.between <= fine.between:
             raise _Note(f"{errors}.")
