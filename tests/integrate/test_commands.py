@@ -49,6 +49,7 @@ FAILURES = {
     "ends in the middle": "ended with exit code 1 before it said done",
     "no line end": "ended with exit code 0 before it said done",
     "dies at the third request": "ended with exit code 1 before it said done; its standard error ends with: out of",
+    "needs a time": "ended with exit code 1 before it said done to a request without times; its standard error",
     "not utf-8": "which is not UTF-8",
     "closes its output": "closed its output before it said done",
     "a line without an end": "wrote a line of more than 1048576 characters",
@@ -134,6 +135,11 @@ def test_a_faulty_program_fails_with_its_reason_and_leaves_no_process(fault: str
     commands.close_all()
     assert gone(fault)
     assert fault not in SILENT or monotonic() - began < 10
+
+
+def test_a_request_without_times_has_the_step_too() -> None:
+    integrate = registry.ready(program("needs a setting"), ("step", Fraction(1, 4)))
+    assert integrate(CASE.top, CASE.start, TIMES, DOUBLE).steps == 4
 
 
 @pytest.mark.slow

@@ -180,6 +180,10 @@ def main():
             if int(given["times"][0]) and fault in INSTEAD:
                 INSTEAD[fault]()
             elif given["times"] == ["0"]:
+                if fault == "needs a time":
+                    sys.exit("list index out of range")
+                if fault == "needs a setting":
+                    given["setting"][0]
                 out("done steps 0")
             else:
                 answer(fault, given)

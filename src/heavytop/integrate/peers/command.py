@@ -162,7 +162,7 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         grid = [rounded(time, precision) for time in instants]
         request = self.request(problem, grid, value)
         with session(self) as program:
-            overhead = program.empty_request(problem)
+            overhead = program.empty_request(problem, value)
             reply = program.ask(request)
         return self._trajectory(request, reply, max(reply.wall - overhead, _LEAST_SHARE * reply.wall))
 
@@ -414,11 +414,11 @@ class Session:
         self.greeting = said(text.partition("ready")[2])
         return True
 
-    def empty_request(self, problem: Problem) -> float:
+    def empty_request(self, problem: Problem, control: Fraction | None) -> float:
         """Seconds of a request without times, made once per row: the minimum over this process, at most 1 ms."""
         if not self._began_row:
             for _ in range(1 if self.requests else 2):  # the first request of a process is slow
-                wall = self.ask(self.command.request(problem, [], None)).wall
+                wall = self.ask(self.command.request(problem, [], control)).wall
                 self._overhead = min(self._overhead, wall)
             self._began_row = True
         return self._overhead
@@ -440,7 +440,8 @@ class Session:
         reply = Reply(self.name, request)
         text = request.text(self.requests)
         seconds = stopwatch(self.process.pid)
-        reply.wall = seconds(self._exchange(text, reply.take, "done", limit))
+        awaited = "done" if request.times else "done to a request without times"
+        reply.wall = seconds(self._exchange(text, reply.take, awaited, limit))
         return reply
 
     def _exchange(self, text: bytes, take: Callable[[bytes], bool], awaited: str, seconds: float = inf) -> float:
