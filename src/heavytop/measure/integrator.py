@@ -108,26 +108,26 @@ def tried(
 ) -> tuple[Figures, Trajectory]:
     """Seconds of a third-party integrator to the last time alone, and such a run from the start itself.
 
+    Runs over all times are timed where the run to the last time alone ends elsewhere than ``judged``: samples shorten
+    the steps of a method that is set by a tolerance.
     judged: the run over all times.  error: of ``judged``, None if unknown.  how: as in :func:`timed`.
     Raises PeerFailed if equal calls differ, if results are kept between calls, and if a timed run ends elsewhere than
     ``judged``.
     """
-    times = judged.times
+    how = how._replace(least=max(how.least, 2), most=max(how.most, 2))
+    times, allowed = judged.times, _tolerated(problem, judged, how.most, error)
     again = integrate(times)
     require_equal(name, judged, again)
     alone = integrate(times[-1:])
-    how = how._replace(least=max(how.least, 2), most=max(how.most, 2))
-    figures, runs = timed(lambda j: integrate(times[-1:], _nudged(problem, j)), how)
-    allowed = _tolerated(problem, judged, len(runs), error)
-    for run, what in [
-        (alone, "asked for its last time alone"),
-        *((run, "from a start units in the last place away") for run in runs),
-    ]:
-        _require_near(name, run, judged, allowed, what, len(times))
+    _require_success(name, alone, "asked for its last time alone", len(times))
+    kept = alone if allowed is None or _distance(alone, judged) <= allowed else again
+    figures, runs = timed(lambda j: integrate(kept.times, _nudged(problem, j)), how)
+    for run in runs:
+        _require_near(name, run, judged, allowed, "from a start units in the last place away", len(times))
     if len(runs) > 1:
         _require_computed(name, integrate, problem, runs)
     compiling = max(0.0, judged.seconds["run"] - again.seconds["run"]) + max(0.0, alone.seconds["run"] - figures["run"])
-    return {"compile": compiling} | figures, alone
+    return {"compile": compiling} | figures, kept
 
 
 def _nudged(problem: Problem, count: int) -> State:
@@ -164,9 +164,13 @@ def _distance(first: Trajectory, second: Trajectory) -> Fraction:
     return max(abs(exact(a) - exact(b)) for a, b in zip(first.states[-1], second.states[-1], strict=True))
 
 
-def _require_near(name: str, run: Trajectory, judged: Trajectory, most: Fraction | None, what: str, count: int) -> None:
+def _require_success(name: str, run: Trajectory, what: str, count: int) -> None:
     if run.outcome is not Outcome.SUCCESS:
         raise PeerFailed(f"{name} ended as {run.outcome.value} {what}, and as success asked for {count} times")
+
+
+def _require_near(name: str, run: Trajectory, judged: Trajectory, most: Fraction | None, what: str, count: int) -> None:
+    _require_success(name, run, what, count)
     if most is not None and (off := _distance(run, judged)) > most:
         raise PeerFailed(
             f"{name}, {what}, ends {decimal_text(off, 2)} away from its run with {count} times, of which its error "

@@ -165,8 +165,6 @@ class WorkPrecision(Kind):
         if task.options.attitude and task.integrator.carries_attitude:
             turned, more = _of_attitude(task)
             metrics |= more
-        if error is not None and not task.integrator.one_step:  # it may begin anew at each sample, and be off by less
-            error = max(error, _error(_scored(task, problem, integrate(task.times[-1:]))) or error)
         seconds, alone = self._timed(task, integrate, sampled, error)
         done = alone.outcome is Outcome.SUCCESS and sampled.outcome is Outcome.SUCCESS
         if case.system is not GYROSTAT:
