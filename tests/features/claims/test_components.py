@@ -5,7 +5,9 @@ from typing import Any
 import pytest
 
 from heavytop.errors import InputError
+from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.features.claims.audit.judge import Audit
+from heavytop.top.equations import GYROSTAT
 from support.claim_tables import audited, open_conditions, top
 
 # Lagrange's top between the heights u1 and u2, from rest at u1, with numbers
@@ -156,6 +158,31 @@ def test_definitions_too_large_to_substitute_are_of_the_component(square: str, v
     growing = {f"f{i + 1}": f"f{i} + f{i} - f{i}" for i in range(7)}
     table = CIRCLE | {"definitions": {"f0": square} | growing}
     assert audited(table | {"component": CIRCLE["component"] | {"reduced": "f7"}}).verdict == verdict
+
+
+def test_a_component_that_does_not_move_has_no_equation_of_the_second_order() -> None:
+    """√Ω3 is 1: u'² = 1 − u² holds of it, and cos t is not it."""
+    component = {"quantity": "sqrt(Omega3)", "constants": ["Omega3"], "reduced": "1 - u^2", "value": "cos(t)"}
+    start = {"omega": ["1", "0", "1"], "gamma": ["0", "0", "1"]}
+    assert audited(CIRCLE | {"start": start, "component": component}).verdict == "undecided"
+
+
+def test_the_start_gives_the_gyrostats_energy_to_a_gyrostat() -> None:
+    """A sphere with a rotor about axis 2, for which the energy of a heavy top is not constant."""
+    table = CIRCLE | {
+        "top": top("1 1 1", "1/2 0 1") | {"rotor": "1"},
+        "start": {"omega": ["1", "1", "0"], "gamma": ["3/5", "0", "4/5"]},
+        "component": {
+            "quantity": "Omega1",
+            "constants": ["Omega2", "Omega1^2 + Omega3^2"],
+            "reduced": "1 - u^2",
+            "value": "cos(t)",
+        },
+    }
+    assert audited(table | {"system": "gyrostat"}).verdict == "holds"
+    claim = claim_from_table({"name": "x", **table}, "x")
+    assert audit_claim(claim, GYROSTAT).verdict == "holds"
+    assert audit_claim(claim).verdict == "refuted"
 
 
 SEED: dict[str, Any] = {

@@ -62,7 +62,7 @@ def read_claim(path: Path) -> FileClaim | ValueClaim:
     if len(raw) > _MAX_BYTES:
         raise InputError(f"{path} is longer than {_MAX_BYTES} bytes.", "A claim is a page of formulas.")
     try:
-        table = tomllib.loads(raw.decode())
+        table = tomllib.loads(raw.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:  # an integer of too many digits is a ValueError of its own
         raise InputError(f"{path} is not TOML: {str(error)[:200]}.", _REMEDY) from None
     return claim_from_table(table, str(path))

@@ -14,6 +14,7 @@ from fractions import Fraction
 from functools import cached_property
 
 import sympy
+from msgspec import structs
 
 from heavytop.errors import InputError
 from heavytop.features.claims.algebra.conditions import ConditionKind, Need, condition, is_exactly_zero
@@ -34,9 +35,9 @@ from heavytop.features.claims.audit.context import (
     setting_of,
     three,
 )
-from heavytop.features.claims.audit.judge import Progress, StatementVerdict, judge, silent, verdict_of
+from heavytop.features.claims.audit.judge import Audit, Progress, StatementVerdict, judge, silent, verdict_of
 from heavytop.features.claims.audit.user_claims import OFF_SPHERE, UserIntegral
-from heavytop.top.equations import System, area, energy
+from heavytop.top.equations import GYROSTAT, System, area, energy, gyrostat_energy
 
 _OMEGA, _GAMMA = STATE[:3], STATE[3:]
 _ACROSS = _GAMMA[0] ** 2 + _GAMMA[1] ** 2
@@ -114,8 +115,9 @@ class UserComponent(UserIntegral):
         """First integrals minus their values at the start."""
         if not self.start:
             return
-        p = self.context.parameters(self.about(None))
-        standard = [energy(p, STATE), area(p, STATE)]
+        about = self.about(None)
+        p = self.context.parameters(about)
+        standard = [(gyrostat_energy if about is GYROSTAT else energy)(p, STATE), area(p, STATE)]
         constants = [_read(text, self.context.names, "component.constants") for text in self._component.constants]
         for formula in (*map(symbol, standard), *constants):
             yield replace(formula, expression=formula.expression - self._at_start(formula.expression))
@@ -164,11 +166,18 @@ class UserComponent(UserIntegral):
     def _groups(self, system: System) -> Iterator[tuple[list[Statement], Setting]]:
         """Statements with their settings: in u, on the state where they are no functions of u, and in time."""
         in_u, on_state = self._reduced(system)
-        base = setting_of(self.context, self._u)
-        yield in_u, replace(base, samples=tuple(s for s in base.samples if self._moves(system, dict(s))))
-        if on_state:
-            yield on_state, self.at_states
+        squares = [s for s in on_state if s.equation == "reduced"]
+        # where u is constant, u'^2 = f(u) does not imply u'' = f'(u)/2
+        for statements, setting in ((in_u, setting_of(self.context, self._u)), (squares, self.at_states)):
+            yield statements, replace(setting, samples=tuple(s for s in setting.samples if self._moves(system, s)))
+        yield [s for s in on_state if s.equation != "reduced"], self.at_states
         yield self._in_time(system), setting_of(self.context, TIME)
+
+    def audit(self, about: System, progress: Progress = silent) -> Audit:
+        """The audit as a claim about a system, with the values at the start of its own first integrals."""
+        if about is self.about(None):
+            return super().audit(about, progress)
+        return UserComponent(structs.replace(self.content, system=about.name)).audit(about, progress)
 
     def rows(self, about: System, progress: Progress = silent) -> tuple[StatementVerdict, ...]:
         """The verdicts, group by group."""
@@ -178,7 +187,7 @@ class UserComponent(UserIntegral):
         """The claim's own system, where every row holds."""
         return (about.name,) if verdict_of(rows) == "holds" else ()
 
-    def _moves(self, system: System, sample: Point) -> bool:
+    def _moves(self, system: System, sample: Mapping[sympy.Symbol, Fraction]) -> bool:
         """Whether u is not constant along the motion from the start."""
         rate = self._rate(system)
         first = rate(self.quantity.expression)
