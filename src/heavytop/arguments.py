@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
 from heavytop import written_numbers
-from heavytop.errors import ImpossibleBody, InputError, argument, quoted
+from heavytop.errors import ImpossibleBody, InputError, quoted, refusal
 from heavytop.precision import (
     DOUBLE,
     EXTENDED,
@@ -52,7 +52,7 @@ _Kind = TypeVar("_Kind", HeavyTop, State)
 def is_a(value: object, kind: type[_Kind], what: str) -> _Kind:
     """``value``, checked to be of type ``kind``."""
     if not isinstance(value, kind):
-        raise InputError(f"{what} must be a {kind.__name__}; got {quoted(value)}.", _TYPES)
+        raise refusal(what, f"a {kind.__name__}", quoted(value), _TYPES)
     return value
 
 
@@ -94,7 +94,7 @@ def system(value: System | str | None, *tops: HeavyTop | Body) -> System:
     Raises InputError for a system without rotor if a top has one.
     """
     if not (value is None or isinstance(value, str) or any(value is known for known in SYSTEMS)):
-        raise InputError(f"system must be a name; got {quoted(value)}.", f"Give {WHICH_SYSTEM}, as text.")
+        raise refusal("system", "a name", quoted(value), f"Give {WHICH_SYSTEM}, as text.")
     return system_of(value, *tops)
 
 
@@ -144,7 +144,7 @@ def positive(value: Number | None, what: str) -> Fraction | None:
     """A positive number, or None."""
     number = None if value is None else physical(value, what)
     if number is not None and number <= 0:
-        raise InputError(f"{argument(what)} must be positive; got {shown(number)}.", "Give a number above 0.")
+        raise refusal(what, "positive", shown(number), "Give a number above 0.")
     return number
 
 
@@ -154,7 +154,7 @@ def count(value: int | None, what: str) -> int | None:
         return None
     number = as_integer(value, what)
     if number < 1:
-        raise InputError(f"{what} must be at least 1; got {quoted(number)}.", "Give 1 or more, or leave it out.")
+        raise refusal(what, "at least 1", quoted(number), "Give 1 or more, or leave it out.")
     return min(number, _MOST)
 
 
@@ -162,7 +162,7 @@ def steps(value: int | None) -> int | None:
     """A limit of steps, or None."""
     number = None if value is None else as_integer(value, "step_limit")
     if number is not None and number < 1:
-        raise InputError(f"{argument('step_limit')} must be at least 1; got {quoted(number)}.", "Give 1 or more.")
+        raise refusal("step_limit", "at least 1", quoted(number), "Give 1 or more.")
     return None if number is None else min(number, _MOST)
 
 
@@ -177,7 +177,7 @@ def limit(value: Number | None, what: str) -> str | None:
 def flag(value: bool | None, what: str) -> bool | None:
     """A bool, or None."""
     if value is not None and not isinstance(value, bool):
-        raise InputError(f"{what} must be a bool; got {quoted(value)}.", "Give True or False.")
+        raise refusal(what, "a bool", quoted(value), "Give True or False.")
     return value
 
 
@@ -187,7 +187,7 @@ _Call = TypeVar("_Call", bound=Callable[..., object])
 def callback(value: _Call | None, what: str) -> _Call | None:
     """Something to call, or None."""
     if value is not None and not callable(value):
-        raise InputError(f"{what} must be callable; got {quoted(value)}.", "Give a function, or None.")
+        raise refusal(what, "callable", quoted(value), "Give a function, or None.")
     return value
 
 
@@ -199,14 +199,14 @@ def path(value: str | os.PathLike[str], what: str) -> Path:
         if "\0" in str(checked):
             raise ValueError
     except (OSError, TypeError, ValueError):  # no path, or one that no file can have
-        raise InputError(f"{what} must be a path; got {quoted(value)}.", "Give text or a pathlib.Path.") from None
+        raise refusal(what, "a path", quoted(value), "Give text or a pathlib.Path.") from None
     return checked
 
 
 def text(value: object, what: str) -> str:
     """Text."""
     if not isinstance(value, str):
-        raise InputError(f"{what} must be text; got {quoted(value)}.", "Give a str.")
+        raise refusal(what, "text", quoted(value), "Give a str.")
     return value
 
 
@@ -233,7 +233,7 @@ def required(digits: Any) -> Fraction:
     """The required digits, exact; raises InputError unless they are a positive number."""
     number = physical(digits, "require")
     if number <= 0:
-        raise InputError(f"require must be positive; got {quoted(digits)}.", "Give a number of digits, such as 9.5.")
+        raise refusal("require", "positive", quoted(digits), "Give a number of digits, such as 9.5.")
     return number
 
 

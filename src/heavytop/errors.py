@@ -131,6 +131,11 @@ class InputError(HeavyTopError):
     """Bad input: a number, a top, a start, a plan, a file."""
 
 
+def refusal(what: str, rule: str, value: object, remedy: str) -> InputError:
+    """The error of a value that breaks a rule: ``WHAT must be RULE; got VALUE.``"""
+    return InputError(f"{argument(what)} must be {rule}; got {value}.", remedy)
+
+
 class MissingExtra(InputError):
     """A package of an extra is not installed; names the extra and the command that installs it."""
 

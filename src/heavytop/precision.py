@@ -22,7 +22,7 @@ from operator import index, is_
 from threading import RLock
 from typing import TYPE_CHECKING, Any, Generic, ParamSpec, Protocol, Self, SupportsIndex, TypeAlias, TypeVar, cast
 
-from heavytop.errors import HeavyTopError, InputError, argument, quoted
+from heavytop.errors import HeavyTopError, InputError, argument, quoted, refusal
 from heavytop.extras import import_heyoka
 
 if TYPE_CHECKING:
@@ -79,9 +79,7 @@ def real(bits: int) -> Precision:
     """The arbitrary-precision format with ``bits`` (24 to 20000) significant bits; raises InputError outside."""
     count = as_integer(bits, "BITS of real:BITS")
     if count not in REAL_BITS:
-        raise InputError(
-            f"BITS of real:BITS must be from 24 to 20000; got {quoted(count)}.", "Give, for example, real:200."
-        )
+        raise refusal("BITS of real:BITS", "from 24 to 20000", quoted(count), "Give, for example, real:200.")
     return Precision(f"real:{count}", count)
 
 
@@ -106,7 +104,7 @@ def as_integer(value: Any, what: str) -> int:
             return index(value)
     except Exception:  # no integer, or a foreign __index__ that raises
         pass
-    raise InputError(f"{argument(what)} must be an integer; got {quoted(value)}.", "Give an integer.")
+    raise refusal(what, "an integer", quoted(value), "Give an integer.")
 
 
 def available() -> dict[str, str | None]:
@@ -140,9 +138,10 @@ def usable_tolerance(value: Given, precision: Precision) -> Fraction:
     """An exact tolerance; raises InputError unless it goes from the eps of the format to 1."""
     tolerance = physical(value, "tolerance")
     if not precision.eps <= tolerance <= 1:
-        raise InputError(
-            f"The tolerance in {precision.name} must be from its eps, {decimal_text(precision.eps, 3)}, to 1; got "
-            f"{shown(tolerance)}.",
+        raise refusal(
+            f"The tolerance in {precision.name}",
+            f"from its eps, {decimal_text(precision.eps, 3)}, to 1",
+            shown(tolerance),
             "Leave it out for the accuracy of the format.",
         )
     return tolerance
@@ -621,7 +620,7 @@ def ordered(values: Any, what: str, remedy: str) -> list[Any]:
             raise
         except Exception:  # not iterable: an array without dimensions, a generator that fails
             pass
-    raise InputError(f"{what} must be a list; got {quoted(values)}.", remedy)
+    raise refusal(what, "a list", quoted(values), remedy)
 
 
 def dot(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from fractions import Fraction
 from typing import Any
 
-from heavytop.errors import InputError, prefixed
+from heavytop.errors import InputError, prefixed, refusal
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, decimal_text, exact, real, round_to
 
 _HEX = re.compile(r"([+-]?)0[xX](?=\.?[0-9a-fA-F])([0-9a-fA-F]*)\.?([0-9a-fA-F]*)(?:[pP]([+-]?[0-9]{1,6}))?")
@@ -49,7 +49,7 @@ def finite(value: Any, what: str) -> Fraction:
     """A finite number; raises InputError also for NaN and infinities."""
     parsed = number(value, what)
     if parsed is None:
-        raise InputError(f"{what} must be finite; got {value.strip()}.", "Give a finite number.")
+        raise refusal(what, "finite", value.strip(), "Give a finite number.")
     return parsed
 
 

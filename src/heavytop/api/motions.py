@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from heavytop import arguments
 from heavytop.arguments import Number, Numbers
 from heavytop.display import Tabular, TitledTable
-from heavytop.errors import InputError, meant, prefixed, quoted
+from heavytop.errors import InputError, meant, prefixed, quoted, refusal
 from heavytop.exact.bodies import Finder
 from heavytop.exact.catalogue import find
 from heavytop.exact.enclosure.run import EFFORT
@@ -511,7 +511,7 @@ class Integrator:
             if array.ndim == 2 and array.shape[1] == 6 and len(array):
                 return array, True
         except (TypeError, ValueError):
-            raise InputError(f"start must be a State or an array of numbers; got {quoted(start)}.", _SHAPES) from None
+            raise refusal("start", "a State or an array of numbers", quoted(start), _SHAPES) from None
         raise InputError(f"start must have the shape (6,) or (m, 6); got {array.shape}.", _SHAPES)
 
     def _one(self, start: Any, targets: Sequence[OrderedRing]) -> tuple[Any, Outcome, Any, int]:

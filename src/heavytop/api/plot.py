@@ -32,7 +32,7 @@ from heavytop.api.plot_data import (
     principal,
     samples,
 )
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, quoted, refusal
 from heavytop.files import writable
 from heavytop.integrate.trajectory import Trajectory
 from heavytop.measure.scorer import Logs, sample_drifts, sample_errors
@@ -259,10 +259,7 @@ def poincare(
         listed = [section] if isinstance(section, Crossings) else list(section)
     for start in listed:
         if not isinstance(start, Crossings):
-            raise InputError(
-                f"start must be events; got {quoted(start)}.",
-                "Give the result of heavytop.poincare or heavytop.events.",
-            )
+            raise refusal("start", "events", quoted(start), "Give the result of heavytop.poincare or heavytop.events.")
     total = sum(map(len, listed))
     if not total:
         raise InputError("The section has no points.", "Give a later until, or another function.")
@@ -291,7 +288,7 @@ def drift(run: Trajectory, axes: Axes | None = None) -> Axes:
         InputError: for a reference, whose integrals do not drift, and as :func:`sphere`.
     """
     if not isinstance(run, Trajectory):
-        raise InputError(f"run must be a computed motion; got {quoted(run)}.", "Give the result of heavytop.propagate.")
+        raise refusal("run", "a computed motion", quoted(run), "Give the result of heavytop.propagate.")
     samples(run)
     indices = every(len(run.states))
     drawn, times = _flat(axes), np.array([float(exact(run.times[index])) for index in indices])
@@ -418,9 +415,7 @@ def _writer(suffix: str, fps: int) -> AbstractMovieWriter:
     if suffix == ".gif":
         return PillowWriter(fps=fps)
     if suffix != ".mp4":
-        raise InputError(
-            f"A film must be .gif or .mp4; got {quoted(suffix)}.", "Give a path that ends with .gif or .mp4."
-        )
+        raise refusal("A film", ".gif or .mp4", quoted(suffix), "Give a path that ends with .gif or .mp4.")
     if not FFMpegWriter.isAvailable():
         raise InputError(
             "Writing .mp4 needs ffmpeg, which is not installed.", "Install ffmpeg, or give a path that ends with .gif."
@@ -433,9 +428,7 @@ def _flat(axes: Axes | None) -> Axes:
     if axes is None:
         axes = new_figure(6.4, 4.0).add_subplot()
     elif not hasattr(axes, "plot") or getattr(axes, "name", "") == "3d":
-        raise InputError(
-            f"axes must be two-dimensional axes of matplotlib; got {quoted(axes)}.", "Give those of plt.subplots()."
-        )
+        raise refusal("axes", "two-dimensional axes of matplotlib", quoted(axes), "Give those of plt.subplots().")
     axes.grid(visible=True, color=_GREY, alpha=0.25, lw=0.6)
     axes.set_axisbelow(True)
     for side in ("top", "right"):
@@ -448,7 +441,7 @@ def _solid(axes: Axes3D | None) -> Axes3D:
     if axes is None:
         axes = new_figure(5.2, 5.0).add_subplot(projection="3d")
     elif getattr(axes, "name", "") != "3d":
-        raise InputError(f"axes must be three-dimensional; got {quoted(axes)}.", 'Use add_subplot(projection="3d").')
+        raise refusal("axes", "three-dimensional", quoted(axes), 'Use add_subplot(projection="3d").')
     axes.view_init(_ELEVATION, _AZIMUTH)
     axes.locator_params(nbins=4)
     return axes

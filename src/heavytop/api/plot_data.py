@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heavytop.api.motions import propagate
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, quoted, refusal
 from heavytop.integrate.frames import framed
 from heavytop.integrate.trajectory import Problem, Trajectory
 from heavytop.measure.reference import Reference
@@ -102,9 +102,7 @@ class Samples:
 def samples(run: Any) -> Samples:
     """A motion in double; raises InputError unless it has two samples or more, all finite."""
     if not isinstance(run, Trajectory | Reference):
-        raise InputError(
-            f"run must be a motion; got {quoted(run)}.", "Give the result of heavytop.propagate or heavytop.reference."
-        )
+        raise refusal("run", "a motion", quoted(run), "Give the result of heavytop.propagate or heavytop.reference.")
     count = len(run.states)
     if count < _FEWEST:
         raise InputError(
@@ -196,7 +194,7 @@ def path_in_space(run: Any, of: str | None, top: HeavyTop | None) -> tuple[str, 
 def compared(run: Any, known: Any) -> tuple[Problem, list[Fraction], list[list[Fraction]], list[list[Fraction]]]:
     """(problem, times, states, known states), exact, of a subset of many; raises InputError if the times differ."""
     if not isinstance(run, Trajectory):
-        raise InputError(f"run must be a computed motion; got {quoted(run)}.", "Give the result of heavytop.propagate.")
+        raise refusal("run", "a computed motion", quoted(run), "Give the result of heavytop.propagate.")
     samples(run)
     samples(known)
     count = len(run.states)

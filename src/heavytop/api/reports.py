@@ -13,7 +13,7 @@ from heavytop import arguments, records
 from heavytop.api.run_folder import prepare
 from heavytop.arguments import Number
 from heavytop.display import Tabular, TitledTable, plural, printable
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, quoted, refusal
 from heavytop.features.kinds import KINDS
 from heavytop.measure.scalar import digits_kept
 from heavytop.precision import as_integer, ordered
@@ -328,7 +328,7 @@ def read_history(reports: Any, metric: str, case: str, policy: PathLike | None, 
 def _report(source: Any, what: str, read: Callable[[], None]) -> store.AnyReport:
     """A report, or that of a path, whose rows are read lazily; ``read`` is called afterwards."""
     if not isinstance(source, records.Report | str | os.PathLike):
-        raise InputError(f"{what} must be a report; got {quoted(source)}.", "Give a Report, or the path of one.")
+        raise refusal(what, "a report", quoted(source), "Give a Report, or the path of one.")
     if isinstance(source, records.Report):
         check_keys(what, source.rows)
         report: store.AnyReport = source

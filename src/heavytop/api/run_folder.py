@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from heavytop import arguments
 from heavytop.display import printable
-from heavytop.errors import InputError, PeerFailed
+from heavytop.errors import InputError, PeerFailed, refusal
 from heavytop.extras import require_extra
 from heavytop.features.kinds import KINDS
 from heavytop.files import writable
@@ -183,7 +183,7 @@ def prepare(
             "--workers and --scheduler exclude each other: a scheduler has its own workers.", "Give one of them."
         )
     if not save_every >= 0:
-        raise InputError(f"save_every must be 0 or more; got {save_every}.", "Give seconds, such as 10.")
+        raise refusal("save_every", "0 or more", save_every, "Give seconds, such as 10.")
     if resume and out is None:
         raise InputError("--resume needs --out.", "Give the folder of the run that was interrupted.")
     identity = {"name": loaded.name, "sha256": digest, "seed": str(seed)}

@@ -12,7 +12,7 @@ from shlex import quote
 from typing import Any
 
 from heavytop.cases import Case
-from heavytop.errors import InputError
+from heavytop.errors import refusal
 from heavytop.exact.catalogue import matches
 from heavytop.measure.motion import motion_texts
 from heavytop.measure.rounding_noise import FACTORS, factor, scaled
@@ -172,7 +172,7 @@ def ensemble_of(case: Case, count: int, seed: int) -> list[Member]:
     """
     if one_motion(case, seed):
         if count > FACTORS:
-            raise InputError(f"The starts of {case.name} must be at most {FACTORS}; got {count}.", "Give fewer.")
+            raise refusal(f"The starts of {case.name}", f"at most {FACTORS}", count, "Give fewer.")
         return [(scaled(case.top, factor(_SEED_STRIDE * seed, index)), case.start) for index in range(count)]
     return [(case.top, _draw(case, seed, index)) for index in range(count)]
 

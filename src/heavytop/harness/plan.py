@@ -21,7 +21,7 @@ import msgspec
 
 from heavytop import records
 from heavytop.cases import CASES, Case, case, named_bodies, require_possible
-from heavytop.errors import InputError, invalid, meant, nearest, prefixed, quoted
+from heavytop.errors import InputError, invalid, meant, nearest, prefixed, quoted, refusal
 from heavytop.exact.resolved import resolve
 from heavytop.files import read_whole, readable
 from heavytop.harness import BUILT_IN, OF_FEATURES
@@ -293,7 +293,7 @@ def expand(plan: Plan, seed: int = 0, defined: Mapping[str, IntegratorSource] | 
     cannot represent, a repeated measurement, and a top or sweep that nothing measures.
     """
     if not 0 <= seed <= MOST_SEEDS:
-        raise InputError(f"seed must be from 0 to {MOST_SEEDS}; got {seed}.", f"Give a number from 0 to {MOST_SEEDS}.")
+        raise refusal("seed", f"from 0 to {MOST_SEEDS}", seed, f"Give a number from 0 to {MOST_SEEDS}.")
     own_cases, swept = _own_tops(plan), _swept(plan)
     sweeps = list(zip(plan.sweep, swept.values(), strict=True))
     known = own_cases | {name: cases[0] for name, cases in swept.items()}
@@ -433,7 +433,7 @@ def positive(texts: list[str], what: str) -> list[Fraction]:
 def samples(count: int) -> int:
     """The count; raises InputError unless it is valid."""
     if not 1 <= count <= _MAX_SAMPLES:
-        raise InputError(f"samples must be from 1 to {_MAX_SAMPLES}; got {count}.", "Give, for example, 100.")
+        raise refusal("samples", f"from 1 to {_MAX_SAMPLES}", count, "Give, for example, 100.")
     return count
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, refusal
 from heavytop.guard import processors
 from heavytop.integrate.heyoka.engines import Compiled, compiled
 from heavytop.integrate.heyoka.lanes import LaneIntegrator, Lanes, Work
@@ -53,7 +53,7 @@ def propagate_ensemble(
     """
     first, work = work_of(problems, times, step_limit, observer)
     if lanes < 2:
-        raise InputError(f"lanes must be at least 2; got {lanes}.", "Use 2 lanes or more.")
+        raise refusal("lanes", "at least 2", lanes, "Use 2 lanes or more.")
     batch = first.precision == DOUBLE and work.moves
     width = lanes if batch else None
     tool = compiled(first.system, first.precision, attitude=first.xi is not None, lanes=width, **options)
@@ -87,7 +87,7 @@ def in_threads(
     """
     threads = processors() if threads is None else threads
     if threads < 1:
-        raise InputError(f"threads must be at least 1; got {threads}.", "Use 1 thread or more.")
+        raise refusal("threads", "at least 1", threads, "Use 1 thread or more.")
     threads = min(threads, -(-len(work.pending) // width))
     done: dict[int, Trajectory] = {}
     error_state = numpy.geterr()

@@ -33,6 +33,7 @@ from heavytop.errors import (
     invalid,
     meant,
     quoted,
+    refusal,
 )
 from heavytop.extras import extra_of, missing
 from heavytop.files import readable
@@ -389,7 +390,7 @@ def of_callable(call: Any) -> IntegratorSource:
     if isinstance(call, Command | PythonFile | PythonObject):
         return call
     if not callable(call):
-        raise InputError(f"integrator must be callable; got {quoted(call)}.", "Give a name, a file or a callable.")
+        raise refusal("integrator", "callable", quoted(call), "Give a name, a file or a callable.")
     own = getattr(call, "integrator_name", None)
     file, function = place_of(call)
     plain = PythonFile(file, function).name if file else re.sub(r"[^\w.:+-]", "", function)[:64]
@@ -456,10 +457,7 @@ def seconds_of(value: Any, what: str) -> float:
     """A time limit in seconds; raises InputError unless it is above 0."""
     seconds = physical(value, what)
     if not 0 < seconds <= _MOST_SECONDS:
-        raise InputError(
-            f"{what} must be positive and at most {_MOST_SECONDS} seconds; got {quoted(value)}.",
-            "Give seconds, such as 60.",
-        )
+        raise refusal(what, f"positive and at most {_MOST_SECONDS} seconds", quoted(value), "Give seconds, such as 60.")
     return float(seconds)
 
 

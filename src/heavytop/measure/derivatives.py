@@ -11,7 +11,7 @@ import numpy
 from flint import arb
 from numpy.typing import NDArray
 
-from heavytop.errors import InputError, OutOfReach, quoted
+from heavytop.errors import InputError, OutOfReach, quoted, refusal
 from heavytop.exact.enclosure.derivatives import DATA, METHOD, derivatives
 from heavytop.exact.enclosure.run import EFFORT, Validated
 from heavytop.exact.flint.balls import ball, largest_singular_value, value_text, whole_evaluation, working_precision
@@ -80,9 +80,7 @@ def which_derivatives(value: object) -> str | None:
     """ "start", "data", "all", or None for none; raises InputError for any other."""
     if value is None or (isinstance(value, str) and value in WHICH):
         return value
-    raise InputError(
-        f'derivatives must be "start", "data" or "all"; got {quoted(value)}.', "Give one of these, or None."
-    )
+    raise refusal("derivatives", '"start", "data" or "all"', quoted(value), "Give one of these, or None.")
 
 
 def known_derivatives(

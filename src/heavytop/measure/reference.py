@@ -14,7 +14,7 @@ from flint import arb
 from numpy.typing import NDArray
 
 from heavytop.display import Tabular, TitledTable, path_picture
-from heavytop.errors import InputError, OutOfReach, quoted
+from heavytop.errors import InputError, OutOfReach, quoted, refusal
 from heavytop.exact.bodies import BodyMotion, Finder
 from heavytop.exact.catalogue import find
 from heavytop.exact.closed_form import initial_xi
@@ -443,7 +443,7 @@ def reference(
     start; OutOfReach if the digits cannot be proven, and for numbers of more than 9,000 digits.
     """
     if digits not in DIGITS:
-        raise InputError(f"digits must be from 1 to 20000; got {quoted(digits)}.", "Give, for example, 50.")
+        raise refusal("digits", "from 1 to 20000", quoted(digits), "Give, for example, 50.")
     instants = [exact(time) for time in times]
     known = BodyMotion(top, start, system, finder, effort)
     require_handy(known.resolved.top, known.resolved.start, instants)

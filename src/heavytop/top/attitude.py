@@ -23,7 +23,7 @@ from math import isqrt
 from types import ModuleType, SimpleNamespace
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from heavytop.errors import InputError, prefixed, quoted
+from heavytop.errors import InputError, prefixed, quoted, refusal
 from heavytop.precision import (
     Given,
     Real,
@@ -296,10 +296,7 @@ class Attitude:
     def rotation(cls, rotation: Rotation) -> Attitude:
         """From one ``scipy.spatial.transform.Rotation``, body to space; raises InputError for several."""
         if not getattr(rotation, "single", False):
-            raise InputError(
-                f"rotation must be a single Rotation; got {quoted(rotation)}.",
-                "Give a Rotation of scipy.spatial.transform.",
-            )
+            raise refusal("rotation", "a single Rotation", quoted(rotation), "Give one of scipy.spatial.transform.")
         x, y, z, w = rotation.as_quat().tolist()
         return cls.quaternion(w, x, y, z, normalize=True)
 

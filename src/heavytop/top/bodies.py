@@ -10,7 +10,7 @@ from math import isqrt, lcm
 from pathlib import Path
 from typing import Any
 
-from heavytop.errors import InputError, argument, prefixed, quoted
+from heavytop.errors import InputError, argument, prefixed, quoted, refusal
 from heavytop.precision import (
     Given,
     Vector,
@@ -261,7 +261,7 @@ class Body:
     ) -> None:
         data = {"mass": _number(mass, "mass"), "gravity": magnitude_of_gravity(gravity)}
         if data["mass"] <= 0:
-            raise InputError(f"mass must be positive; got {shown(data['mass'])}.", "Give the mass of the body.")
+            raise refusal("mass", "positive", shown(data["mass"]), "Give the mass of the body.")
         centre_vector = vector(centre, "centre")
         inertia_tensor = _tensor(inertia)
         to_pivot = _about(about, centre_vector) == CENTRE
@@ -399,7 +399,7 @@ def _about(about: object, centre: Vector) -> str:
             )
         return PIVOT
     if not isinstance(about, str) or about not in (PIVOT, CENTRE):
-        raise InputError(f'about must be "{PIVOT}" or "{CENTRE}"; got {quoted(about)}.', "Give one of these.")
+        raise refusal("about", f'"{PIVOT}" or "{CENTRE}"', quoted(about), "Give one of these.")
     return about
 
 
@@ -534,12 +534,10 @@ def _attitude(kind: str, value: Any, normalize: bool) -> Attitude:
     if kind == "axis_angle":
         axis, colon, angle = value.partition(":") if isinstance(value, str) else ("", "", "")
         if not colon:
-            raise InputError(f"axis_angle must be an axis and an angle; got {quoted(value)}.", "Give x,y,z:angle.")
+            raise refusal("axis_angle", "an axis and an angle", quoted(value), "Give x,y,z:angle.")
         return Attitude.axis_angle(axis.split(","), angle)
     sequence, colon, angles = value.partition(":") if isinstance(value, str) else ("", "", "")
     parts = angles.split(",")
     if not colon or len(parts) != 3:
-        raise InputError(
-            f"euler must be a sequence and three angles; got {quoted(value)}.", "Give ZXZ:a,b,c or another sequence."
-        )
+        raise refusal("euler", "a sequence and three angles", quoted(value), "Give ZXZ:a,b,c or another sequence.")
     return Attitude.euler(sequence.strip(), *parts)

@@ -16,7 +16,7 @@ from math import isqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from heavytop.errors import InputError, prefixed, quoted
+from heavytop.errors import InputError, prefixed, quoted, refusal
 from heavytop.files import read_whole, readable
 from heavytop.precision import Vector, cross, exact, round_to, six_digits, vector
 from heavytop.top import inertia_slips
@@ -98,7 +98,7 @@ def read_body(path: Path, link: str | None = None) -> BodyInFile:
         raise InputError(f"{path} holds {len(chosen)} bodies: {names}.", remedy)
     body = chosen[0][1]()
     if body.mass <= 0:
-        raise InputError(f"{body.name}: mass must be positive; got {body.mass}.", "Give its mass in kg.")
+        raise refusal(f"{body.name}: mass", "positive", body.mass, "Give its mass in kg.")
     largest = max(map(abs, body.six))
     extremes = max(body.mass, largest, *map(abs, body.centre)), min(body.mass, largest or body.mass)
     if extremes[0] > _LARGEST or extremes[1] < 1 / _LARGEST:
@@ -210,7 +210,7 @@ class _Numbers:
         """A boolean of SDF, false where it is missing."""
         value = (text or "").strip().lower() or "false"
         if value not in ("true", "1", "false", "0"):
-            raise InputError(f"{self.where}: {what} must be true or false; got {quoted(value)}.", "Give one of them.")
+            raise refusal(f"{self.where}: {what}", "true or false", quoted(value), "Give one of them.")
         return value in ("true", "1")
 
     def some(self, text: str | None, what: str, count: int, default: str | None = None) -> list[Fraction]:

@@ -10,7 +10,7 @@ from math import isqrt
 from operator import lt
 from typing import Any, cast
 
-from heavytop.errors import InputError, argument, prefixed, quoted
+from heavytop.errors import InputError, argument, prefixed, quoted, refusal
 from heavytop.precision import (
     MOST_MEMBERS,
     Given,
@@ -72,10 +72,7 @@ class HeavyTop:
         moments = vector(inertia, "inertia")
         for axis, value in enumerate(moments, 1):
             if value <= 0:
-                raise InputError(
-                    f"The principal moment I{axis} must be positive; got {shown(value)}.",
-                    "Give positive moments of inertia.",
-                )
+                raise refusal(f"The principal moment I{axis}", "positive", shown(value), "Give positive moments.")
         try:
             load = exact(weight)
         except InputError as error:
@@ -163,8 +160,10 @@ class State:
     ) -> None:
         if (omega is None) == (omega_space is None):
             which = "both" if omega is not None else "neither"
-            raise InputError(
-                f"Exactly one of omega and omega_space must be given; got {which}.",
+            raise refusal(
+                "Exactly one of omega and omega_space",
+                "given",
+                which,
                 "Give omega in body axes, or omega_space in space axes.",
             )
         if attitude is None:
@@ -175,9 +174,8 @@ class State:
             up = vector(gamma, "gamma")
         else:
             if not isinstance(attitude, Attitude):
-                raise InputError(
-                    f"attitude must be an Attitude; got {quoted(attitude)}.",
-                    "Use Attitude.quaternion(w, x, y, z) or another constructor.",
+                raise refusal(
+                    "attitude", "an Attitude", quoted(attitude), "Use Attitude.quaternion(w, x, y, z) or another."
                 )
             up = attitude.rational_rows(_ATTITUDE_BITS)[2]
             if gamma is not None:

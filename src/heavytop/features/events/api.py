@@ -9,7 +9,7 @@ from typing import Any, overload
 
 from heavytop import arguments
 from heavytop.arguments import Number
-from heavytop.errors import InputError, OutOfReach, prefixed, quoted
+from heavytop.errors import InputError, OutOfReach, prefixed, quoted, refusal
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import require_handy, value_text
 from heavytop.exact.resolved import Resolved, resolve
@@ -147,11 +147,13 @@ def _known_events(
     """Proven events of a motion that was checked."""
     function = wanted.function
     if digits not in DIGITS:
-        raise InputError(f"digits must be from 1 to 20000; got {quoted(digits)}.", "Give, for example, 50.")
+        raise refusal("digits", "from 1 to 20000", quoted(digits), "Give, for example, 50.")
     if not function.rational:
-        raise InputError(
-            f"For a proof the function must be rational in Ω and γ; got {quoted(function.name)}.",
-            "Write it with +, -, * and / alone, or leave digits out: then it is sampled.",
+        raise refusal(
+            "For a proof the function",
+            "rational in Ω and γ",
+            quoted(function.name),
+            "Use +, -, * and / alone, or leave out digits.",
         )
     resolved = _resolved(top, start, until, digits, system)
     require_handy(resolved.top, resolved.start, [until])
@@ -255,5 +257,5 @@ def require_direction(value: int) -> int:
     """1, -1 or 0; raises InputError for any other."""
     sign = as_integer(value, "direction")
     if sign not in (-1, 0, 1):
-        raise InputError(f"direction must be a sign; got {quoted(sign)}.", "Give 1 (rising), -1 (falling) or 0 (both).")
+        raise refusal("direction", "a sign", quoted(sign), "Give 1 (rising), -1 (falling) or 0 (both).")
     return sign

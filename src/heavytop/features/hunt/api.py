@@ -10,7 +10,7 @@ from typing import Any
 
 from heavytop import arguments
 from heavytop.arguments import Number
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, quoted, refusal
 from heavytop.features.hunt.measured import FAMILIES, Family
 from heavytop.features.hunt.search import Advance, Hunted, HuntRequest, documents
 from heavytop.features.hunt.search import hunt as search
@@ -87,7 +87,7 @@ def hunt(
         if chosen is not None:
             registry.require(chosen)
     if not isinstance(family, str) or family not in FAMILIES:
-        raise InputError(f"family must be a known one; got {quoted(family)}.", f"Use {', '.join(FAMILIES)}.")
+        raise refusal("family", "a known one", quoted(family), f"Use {', '.join(FAMILIES)}.")
     time = physical(horizon, "horizon")
     if not time:
         raise InputError("horizon must not be zero.", "Give a time other than 0, such as 100.")
@@ -101,7 +101,7 @@ def hunt(
         raise InputError("An integrator is not hunted against itself.", "Give another with --against, or none.")
     first = as_integer(seed, "seed")
     if not 0 <= first <= 10**9:
-        raise InputError(f"seed must be in range; got {quoted(first)}.", "Give a number from 0 to 1000000000.")
+        raise refusal("seed", "in range", quoted(first), "Give a number from 0 to 1000000000.")
     pair = described(which), None if other is None else described(other)
     request = HuntRequest(pair[0], form, time, family, pair[1], beyond, motions, seconds, first)
     try:
@@ -122,7 +122,7 @@ def _budget(value: int | str) -> tuple[int | None, float | None]:
         return int(text), None
     if re.fullmatch(r"[0-9]{1,7}(\.[0-9]{1,3})?s", text) and 0 < float(text[:-1]) <= _MOST_SECONDS:
         return None, float(text[:-1])
-    raise InputError(f"budget must be a time or a number of motions; got {quoted(value)}.", _BUDGET)
+    raise refusal("budget", "a time or a number of motions", quoted(value), _BUDGET)
 
 
 def _again(request: HuntRequest, name: str, against: str | Callable[..., Any] | None, planned: int) -> str:

@@ -17,7 +17,7 @@ import numpy
 from heavytop import arguments
 from heavytop.arguments import Number
 from heavytop.display import Tabular, TitledTable
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, quoted, refusal
 from heavytop.integrate.frames import Setup
 from heavytop.integrate.registry import control_name, named, propagator
 from heavytop.precision import DOUBLE, QUAD, Array, Precision, Scalar, cross, exact_text, physical, real, six_digits
@@ -159,7 +159,7 @@ def power(
 def _names(planted: str | Sequence[str]) -> list[str]:
     names, remedy = planted.split(",") if isinstance(planted, str) else planted, f"Use {', '.join(FAULTS)}, or all."
     if not isinstance(names, list | tuple) or not all(isinstance(name, str) for name in names):
-        raise InputError(f"planted must be names of faults; got {quoted(planted)}.", remedy)
+        raise refusal("planted", "names of faults", quoted(planted), remedy)
     if list(names) == ["all"]:
         return list(FAULTS)
     if unknown := [name for name in names if name not in FAULTS]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from heavytop import arguments
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, quoted, refusal
 from heavytop.extras import require_extra
 from heavytop.features.survey.gathered import COLUMNS, FILE
 from heavytop.files import readable
@@ -37,7 +37,7 @@ def read_survey(path: str | os.PathLike[str], *, columns: Sequence[str] | None =
     wanted = None if columns is None else [columns] if isinstance(columns, str) else ordered(columns, "columns", known)
     for name in wanted or ():
         if not isinstance(name, str) or name not in COLUMNS:
-            raise InputError(f"column must be one of a survey; got {quoted(name)}.", known)
+            raise refusal("column", "one of a survey", quoted(name), known)
     if not file.is_file():
         raise InputError(f"{where} holds no survey.", f"Give the folder of a run that holds {FILE}.")
     if arguments.flag(lazy, "lazy"):

@@ -11,7 +11,7 @@ import msgspec
 import numpy
 
 from heavytop.cases import Case
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, quoted, refusal
 from heavytop.features.survey.charts import survey_charts
 from heavytop.features.survey.gathered import DATA, FILE, chunk_bytes, gathered, of_motions, write
 from heavytop.features.survey.joined import METRIC, worse_motions
@@ -57,7 +57,7 @@ class SurveyTable(PlanTable, tag=NAME):
                 raise InputError(f"A survey must name a sweep; got {quoted(name)}.", "Name sweeps: sweep:NAME.")
         precision = parse(self.precision)
         if precision not in (DOUBLE, EXTENDED):
-            raise InputError(f"precision must be that of a survey; got {precision.name}.", "Use double or extended.")
+            raise refusal("precision", "that of a survey", precision.name, "Use double or extended.")
         (horizon,) = positive([self.horizon], "horizon")
         if self.tolerance:
             positive([self.tolerance], "tolerance")

@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy
 
 from heavytop import precision as vectors
-from heavytop.errors import InputError, PeerFailed, Unsupported, quoted
+from heavytop.errors import InputError, PeerFailed, Unsupported, quoted, refusal
 from heavytop.integrate.peers.contract import (
     DEFAULT_STEP,
     Declared,
@@ -150,7 +150,7 @@ def double_peer(
     """
     singular = tuple(vectors.vector(point, "singular_at") for point in singular_at)
     if attitude not in (False, True, "quaternion"):
-        raise InputError(f'attitude must be True, False or "quaternion"; got {quoted(attitude)}.', "Give one of these.")
+        raise refusal("attitude", 'True, False or "quaternion"', quoted(attitude), "Give one of these.")
     if fixed_grid and control != "step":
         raise InputError('fixed_grid needs control = "step".', "Give both, or neither.")
     able = (_declared(systems), _declared(directions), _declared(precisions))
@@ -213,9 +213,7 @@ def fixed_steps(
 
 def _declared(names: Sequence[str] | None) -> tuple[str, ...] | None:
     if names is not None and (isinstance(names, str) or not all(isinstance(name, str) for name in names)):
-        raise InputError(
-            f"Declared capabilities must be lists of names; got {quoted(names)}.", 'Give, for example, ["heavy_top"].'
-        )
+        raise refusal("Declared capabilities", "lists of names", quoted(names), 'Give, for example, ["heavy_top"].')
     return None if names is None else tuple(names)
 
 

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 from heavytop.display import plural, printable
-from heavytop.errors import InputError, quoted
+from heavytop.errors import quoted, refusal
 from heavytop.measure.scalar import digits_right
 from heavytop.records import UNRESOLVED_SECONDS, UNSUPPORTED, Quantity, Report, Row
 from heavytop.report.compare.compare import Differences
@@ -90,7 +90,7 @@ def measures(row: Row) -> Iterator[Measure]:
 def export(report: Report, to: str, kinds: Kinds) -> str:
     """The text of the file in the format ``to``; raises InputError for an unknown format."""
     if to not in FORMATS:
-        raise InputError(f"The format of an export must be known; got {quoted(to)}.", f"Use {', '.join(FORMATS)}.")
+        raise refusal("The format of an export", "known", quoted(to), f"Use {', '.join(FORMATS)}.")
     return str(resolve_name(FORMATS[to])(report, kinds))
 
 

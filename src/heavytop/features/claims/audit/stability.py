@@ -14,7 +14,7 @@ from typing import Any
 
 import sympy
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, refusal
 from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.prover import Condition
 from heavytop.features.claims.algebra.ring import where_provable
@@ -50,7 +50,7 @@ class UserStability(UserMotion):
         """The heavy top; raises InputError where the file or the caller names another."""
         about = UserMotion.about(self, requested)
         if about is not HEAVY_TOP:
-            raise InputError(f"A claim of stability must be about heavy_top; got {about.name}.", "Leave out the rotor.")
+            raise refusal("A claim of stability", "about heavy_top", about.name, "Leave out the rotor.")
         return about
 
     def rows(self, about: System, progress: Progress = silent) -> tuple[StatementVerdict, ...]:

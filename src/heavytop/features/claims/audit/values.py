@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import msgspec
 from flint import arb
 
-from heavytop.errors import InputError, OutOfReach, prefixed, quoted
+from heavytop.errors import InputError, OutOfReach, prefixed, quoted, refusal
 from heavytop.exact.flint.balls import (
     FUNCTIONS,
     ball,
@@ -78,7 +78,7 @@ class PrintedNumber:
         match = _DECIMAL.fullmatch(plain)
         integer, part = (match["integer"], match["part"] or "") if match is not None else ("", "")
         if match is None or not integer + part:
-            raise InputError(f"{what} must be a decimal number; got {quoted(text)}.", _REMEDY)
+            raise refusal(what, "a decimal number", quoted(text), _REMEDY)
         power = int(match["power"] or 0)
         if len(integer + part) > _MOST_DIGITS or abs(power) > _LARGEST_POWER:
             raise InputError(
@@ -423,10 +423,7 @@ class _KnownNumbers:
             place = f"{figure.place} (component {figure.component}, t = {figure.time_text[:40]})"
             if figure.quantity not in SIZES and figure.quantity not in self._integrals:
                 known = ", ".join((*SIZES, *self._integrals))
-                raise InputError(
-                    f"{place}: quantity must be one of this motion; got {quoted(figure.quantity)}.",
-                    f"Use {known}: the first integrals are those that are constant along it.",
-                )
+                raise refusal(f"{place}: quantity", "one of this motion", quoted(figure.quantity), f"Use {known}.")
             is_fixed = figure.quantity in ("omega", "gamma", *self._integrals)
             is_fixed |= figure.quantity == "position" and figure.component == 3
             if not is_fixed and self.start.attitude is None:

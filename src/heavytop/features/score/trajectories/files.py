@@ -16,7 +16,7 @@ from typing import Any
 from heavytop import written_numbers
 from heavytop.arguments import MOST_STATES
 from heavytop.cases import Case
-from heavytop.errors import InputError, meant, nearest, quoted
+from heavytop.errors import InputError, meant, nearest, quoted, refusal
 from heavytop.features.score.trajectories import bags, logs
 from heavytop.features.score.trajectories import columns as observed_columns
 from heavytop.features.score.trajectories.observed import (
@@ -186,7 +186,7 @@ def _numbers(key: str, text: str) -> list[str]:
     counts = _COUNTS.get(key, (3,))
     if "," in text and (len(numbers) not in counts or _DECIMAL_COMMAS.match(text)):
         remedy = _POINT if len(numbers) > counts[0] or _DECIMAL_COMMAS.match(text) else "Give each of them."
-        raise InputError(f"{key} must be {counts[0]} numbers; got {quoted(text)}.", remedy)
+        raise refusal(key, f"{counts[0]} numbers", quoted(text), remedy)
     return numbers
 
 
