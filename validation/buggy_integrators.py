@@ -183,7 +183,7 @@ def bugs() -> list[tuple[str, str, dict[str, object], tuple[str, ...]]]:
             f"rk4 component {sign} of the field negated",
             "rk4",
             {"sign": sign},
-            (f"equation of {name} has the other sign",),
+            (f"equation of {name} has the opposite sign",),
         )
         for sign, name in signs.items()
     ]

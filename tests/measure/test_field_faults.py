@@ -74,7 +74,7 @@ CHANGES = [(place, (1.00001, 0.0, -1.0)[place % 3]) for place in range(0, len(TE
 def test_every_term_of_the_field_is_named(place: int, factor: float) -> None:
     factors = numpy.ones(len(TERMS))
     factors[place] = factor
-    became = {0.0: "is left out", -1.0: "has the other sign"}.get(factor, f"is {factor} times what it should be")
+    became = {0.0: "is left out", -1.0: "has the opposite sign"}.get(factor, f"is {factor} times what it should be")
     text = said(factors=factors)
     assert text.count(", or ") <= 2  # two terms of one monomial are one function
     assert f"the term {TERMS[place]} of {OWNERS[place]} {became}" in text

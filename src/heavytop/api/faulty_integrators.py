@@ -137,7 +137,7 @@ class Fault:
 _PERTURBED = 1 + Fraction(1, 10**10)
 FAULTS = {
     "sign": Fault(
-        "P γ × r enters (1.1) with the other sign",
+        "P γ × r enters (1.1) with the opposite sign",
         top=lambda top: HeavyTop(top.inertia, top.weight, [-part for part in top.centre]),
     ),
     "coefficient": Fault(

@@ -223,7 +223,7 @@ def _mends(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
         yield _mend(body, "order_urdf", f"The six numbers are in the order {which}.", six)
     yield from _row_major(body)
     flipped = (*n[:3], -n[3], -n[4], -n[5])
-    sentence = "The products of inertia have the other sign: I12 is minus the integral of x y dm."
+    sentence = "The products of inertia have the opposite sign: I12 is minus the integral of x y dm."
     if flipped != n:
         yield _mend(body, "signs_of_products", sentence, flipped)
     if not body.at_pivot and any(body.centre):
@@ -393,7 +393,7 @@ def _of_axes(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
     """Signs of single products of inertia, and axes taken for one another."""
     tensor = rows(body.six)
     for order in permutations(range(3)):
-        name, sentence = "signs_of_products", "Some products of inertia have the other sign."
+        name, sentence = "signs_of_products", "Some products of inertia have the opposite sign."
         if order != (0, 1, 2):
             axes = ", ".join(f"I{i + 1}{i + 1}" for i in order)
             name, sentence = "exchanged_axes", f"The axes are exchanged: {axes} were meant as I11, I22, I33."

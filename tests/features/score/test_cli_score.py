@@ -105,7 +105,7 @@ def test_without_a_reference_and_without_a_sample_no_digits_are_said(unknown: As
     lost = assess(given(spoilt=lambda i, state: [float("nan")] * 6))
     assert printed(lost)[:2] == [
         "The run ended early (non_finite), at t = 0 of 8.",
-        "No digit can be counted: the first state is not finite.",
+        "The number of digits right is unknown: the first state is not finite.",
     ]
 
 
@@ -173,11 +173,11 @@ def test_the_page_of_score_and_that_of_its_report_are_the_same(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("require", "spoilt", "more", "code", "said"),
     [
-        ("8", across, "", 0, "8 digits are required: they are right."),
-        ("9", across, "", 1, "9 digits are required: 8."),
-        ("99", None, "", 1, "99 digits are required: 1"),
-        ("8", across, "9,nan,nan,nan,nan,nan,nan", 3, "8 digits are required: not known, for the run ended early."),
-        ("9", across, "9,nan,nan,nan,nan,nan,nan", 1, "9 digits are required: 8."),
+        ("8", across, "", 0, "8 digits required: satisfied."),
+        ("9", across, "", 1, "9 digits required: only 8."),
+        ("99", None, "", 1, "99 digits required: only 1"),
+        ("8", across, "9,nan,nan,nan,nan,nan,nan", 3, "8 digits required: unknown, because the run ended early."),
+        ("9", across, "9,nan,nan,nan,nan,nan,nan", 1, "9 digits required: only 8."),
     ],
 )
 def test_digits_that_are_required(require: str, spoilt, more: str, code: int, said: str, tmp_path: Path) -> None:
@@ -284,7 +284,9 @@ def test_numbers_of_single_precision_are_noticed(tmp_path: Path) -> None:
     assert caught.value.remedy == "Are these decimal commas? Separate the columns by semicolons."
 
 
-@pytest.mark.parametrize(("most", "said"), [("1e-4", ["Between them the fewest digits right are 4.0."]), ("1e-8", [])])
+@pytest.mark.parametrize(
+    ("most", "said"), [("1e-4", ["Between these samples the fewest digits right are 4.0."]), ("1e-8", [])]
+)
 def test_an_error_between_the_samples_that_are_drawn_is_said(most: str, said: list[str]) -> None:
     across = Quantity(SOLUTION_ERROR, "across")
     course = {across.text: Series(["1", "20"], ["1e-9", "1e-8"], across)}

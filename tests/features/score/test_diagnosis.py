@@ -170,7 +170,7 @@ def test_one_equation_with_the_other_sign_is_named() -> None:
     times = [time / 4 for time in times]
     (told,) = found(top, start, times, runge_kutta(top, start, times, 0.01, negated=4))
     assert (told.kind, told.numbers) == ("component_sign", {"column": "γ2"})
-    assert "equation of γ2 has the other sign" in diagnosis_text(told)
+    assert "equation of γ2 has the opposite sign" in diagnosis_text(told)
 
 
 @pytest.mark.slow
@@ -199,7 +199,7 @@ def test_columns_in_any_order_are_named() -> None:
 def test_vectors_in_each_other_s_place_and_in_other_axes_are_put_in_words() -> None:
     top, start, times = problem(42)
     (told,) = found(top, start, times, runge_kutta(top, start, times)[:, [5, 4, 3, 2, 1, 0]] * [1, 1, -1, 1, 1, -1])
-    said = "The columns mean something else: γ stands before Ω; columns 1, 2, 3 of Ω and γ are axes 3, 2, −1;"
+    said = "The columns have another meaning: γ precedes Ω; columns 1, 2, 3 of Ω and γ are axes 3, 2, −1;"
     assert diagnosis_text(told).startswith(said)
 
 
@@ -288,13 +288,13 @@ def test_a_row_that_is_missing_or_stands_twice_is_found(row: int) -> None:
     assert (missing.kind, float(missing.numbers["t"])) == ("row_missing", float(times[row]))
     (twice,) = found(top, start, times, np.insert(y, row, y[row], axis=0)[:-1])
     assert (twice.kind, float(twice.numbers["t"])) == ("row_twice", float(times[row + 1]))
-    assert diagnosis_text(twice).startswith(f"A row too many: from t = {twice.numbers['t']} on")
+    assert diagnosis_text(twice).startswith(f"There is one row too many: from t = {twice.numbers['t']} on")
 
 
 def test_states_that_do_not_move_are_no_other_clock() -> None:
     top, start, times = problem(8)
     (told,) = found(top, start, times, np.tile([float(value) for value in start.flat], (len(times), 1)))
-    assert diagnosis_text(told) == "Every state is the same: nothing moves."
+    assert diagnosis_text(told) == "All states are the same."
 
 
 @pytest.mark.parametrize("bits", [60, 1100])
@@ -315,9 +315,7 @@ def test_a_sentence_says_of_which_states_it_is_true_where_not_all_were_looked_at
     assert told.looked_at is not None
     looked, states, until = told.looked_at
     assert (states, looked < 60, float(until) < 60) == (100, True, True)
-    assert diagnosis_text(told).startswith(
-        f"Looked at {looked} of the 100 states, to t = {until}. γ points down in these"
-    )
+    assert diagnosis_text(told).startswith(f"Compared {looked} of 100 states, to t = {until}. In these states γ points")
 
 
 @pytest.mark.slow
@@ -408,8 +406,8 @@ def test_a_motion_that_starts_again_is_told_from_rows_that_are_late(again_at: in
 @pytest.mark.parametrize(
     ("left", "said"),
     [
-        (1.19e-15, "to less than 1e-13, so that 13.0 digits or more are right."),
-        (2e-12, "to 2.00e-12, so that 11.7 digits are right."),
+        (1.19e-15, "to less than 1e-13, and 13.0 digits or more are right."),
+        (2e-12, "to 2.00e-12, and 11.7 digits are right."),
     ],
 )
 def test_the_digits_are_those_of_the_error_that_is_printed_beside_them(left: float, said: str) -> None:

@@ -268,7 +268,7 @@ def test_repeated_times_are_one_row_or_an_error_and_a_reset_ends_the_log(tmp_pat
     shown = heavytop("score", path)
     assert shown.returncode == 0
     assert "the time goes back at line 16" in shown.stdout + shown.stderr
-    for require, code, says in (("9", 3, "not known, for the time goes back at line 16"), ("17", 1, " are right.")):
+    for require, code, says in (("9", 3, "unknown, because the time goes back at line 16"), ("17", 1, " are right.")):
         shown = heavytop("score", path, "--require", require)
         assert (shown.returncode, says in shown.stdout) == (code, True)
     assert json.loads(heavytop("score", path, "--json", "--require", "9").stdout)["passed"] is None

@@ -117,8 +117,8 @@ def test_the_sentence_says_what_fits_and_the_digits_that_are_right_with_it(tmp_p
     found = scored(content, tmp_path)
     (told,) = found.diagnoses
     said = to_json(found)["diagnosis"][0]["sentence"]
-    assert said.startswith("The quaternions have their scalar part in the other place")
-    assert "in the columns but not in the start" in said
+    assert said.startswith("The scalar part of the quaternions is at the other end")
+    assert "in the columns only" in said
     assert "so that 13.0 digits or more are right" in said or told.left > 1e-13
 
 
@@ -129,7 +129,7 @@ def test_what_fits_as_well_is_named_with_its_numbers(tmp_path: Path) -> None:
     (told,) = found.diagnoses
     assert [other.kind for other in told.others] == told.numbers["or"].split(", ") == ["column_scaled"]
     sentence = to_json(found)["diagnosis"][0]["sentence"]
-    assert sentence.endswith("As well fits: w of the quaternion is −1 times what fits.")
+    assert sentence.endswith("Equally good: w of the quaternion is scaled by −1.")
 
 
 def lines(**changes: str) -> str:

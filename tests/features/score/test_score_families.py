@@ -101,7 +101,9 @@ def test_one_state_among_a_hundred_is_named(row: int) -> None:
     assert (told.kind, told.numbers["state"]) == ("one_state", f"{row + 1} of 100")
     assert Fraction(told.numbers["t"]) == times[row]
     assert told.left < 1e-11
-    assert diagnosis_text(told).startswith(f"Only the state at t = {told.numbers['t']} is off (state {row + 1} of 100)")
+    assert diagnosis_text(told).startswith(
+        f"Only the state at t = {told.numbers['t']} is wrong (state {row + 1} of 100)"
+    )
 
 
 @pytest.mark.slow
@@ -117,7 +119,7 @@ def test_several_states_are_named_and_a_tail_is_not() -> None:
             continue
         assert (told[0].kind, told[0].numbers["state"]) == (
             "some_states", f"{', '.join(str(row + 1) for row in rows)} of 40")  # fmt: skip
-        assert "are off (states" in diagnosis_text(told[0])
+        assert "are wrong (states" in diagnosis_text(told[0])
     states = right.copy()
     states[-3:, 0] += 0.1
     assert kinds(scored(states, times)) == []
@@ -146,8 +148,8 @@ def test_columns_that_are_scaled_are_named_with_their_factor(name: str) -> None:
     assert (told.kind, told.numbers.get("column")) == (kind, name if name in COLUMNS else None)
     assert all(float(told.numbers[key]) == pytest.approx(value, rel=1e-7) for key, value in numbers.items())
     text = diagnosis_text(told)
-    assert kind != "omega_scaled" or f"Ω is {told.numbers['factor']} times what fits" in text
-    assert ("has the other sign in these states" in text) == (numbers.get("factor") == -1)
+    assert kind != "omega_scaled" or f"Ω is scaled by {told.numbers['factor']}" in text
+    assert ("has the opposite sign in these states" in text) == (numbers.get("factor") == -1)
     if "_in_" in kind:
         assert kinds(scored(RIGHT[:1] * factors, TIMES[:1])) == [kind]
 

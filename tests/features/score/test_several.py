@@ -31,11 +31,11 @@ def test_the_order_is_that_of_the_two_finest_steps_above_rounding() -> None:
 
 def test_an_explanation_is_its_name_and_words_and_says_where_the_names_are() -> None:
     words = cause(Diagnosis("one_state", {"t": "3", "state": "3 of 9"}, 1.0, 1e-12), "heavy_top")
-    assert words == "Only the state at t = 3 is off (state 3 of 9)"
-    assert cause(Diagnosis("gamma_down", {"of": "columns"}), "heavy_top").startswith("γ points down: with −γ it fits")
+    assert words == "Only the state at t = 3 is wrong (state 3 of 9)"
+    assert cause(Diagnosis("gamma_down", {"of": "columns"}), "heavy_top").startswith("γ points down")
     lines = text([scored("a", "1", 1.0), replace(scored("b", "1", 1.0), explained=f"one_state: {words}")]).splitlines()
     assert lines[2].endswith(f"5.0  one_state: {words}")
-    assert lines[3].startswith("`heavytop docs score`, What went wrong,")
+    assert lines[3].startswith("`heavytop docs score` explains")
 
 
 @pytest.mark.parametrize(
@@ -59,8 +59,8 @@ def test_files_are_scored_in_parallel_and_a_bad_one_does_not_stop_the_others(tmp
     required = [_scored_file(path, None, "4.3", False) for path in (paths[0], paths[2])]
     assert exit_code(required) == ExitCode.FINDING
     coarse, fine = text(required).splitlines()[-2:]
-    assert coarse.endswith("coarse.csv: 4.3 digits are required: 4 are right.")
-    assert fine.endswith("fine.csv: 4.3 digits are required: they are right.")
+    assert coarse.endswith("coarse.csv: 4.3 digits required: only 4 are right.")
+    assert fine.endswith("fine.csv: 4.3 digits required: satisfied.")
     done = heavytop("score", *paths, "--require", "4.3", "--json")
     assert done.returncode == ExitCode.BAD_INPUT
     document = json.loads(done.stdout)

@@ -223,5 +223,5 @@ def _said(factor: _Factor, number: Fraction) -> str:
     if number == 0:
         return f"{factor.text} is left out"
     if number == -1:
-        return f"{factor.text} has the other sign"
+        return f"{factor.text} has the opposite sign"
     return f"{factor.text} is {plain_decimal(number, 8)} times what it should be"

@@ -55,7 +55,7 @@ _PART = 0.1
 """A length off 1 explains the error if it is at least this part of it."""
 _WORDS = {
     "omega": "Ω in body axes",
-    "omega_space": "Ω in axes of space",
+    "omega_space": "Ω in space axes",
     "gamma": "γ",
     "quaternion": "quaternion",
     "matrix": "matrix",

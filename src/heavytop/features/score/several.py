@@ -104,7 +104,7 @@ def text(files: Sequence[ScoredFile]) -> str:
     lines = [f"{'file':{width}}  digits right  explained by"]
     lines += [f"{clip(file.path, width):{width}}  {file.digits:>12}  {file.explained}".rstrip() for file in files]
     if any(file.digits and file.explained for file in files):
-        lines.append("`heavytop docs score`, What went wrong, lists the names before a colon.")
+        lines.append("`heavytop docs score` explains the names before a colon (What went wrong).")
     for order in orders(files):
         said = f"order {order.order:z.1f} over {len(order.paths)} steps"
         lines.append(f"{said}: {clip(order.paths[0], width)} to {clip(order.paths[-1], width)}")

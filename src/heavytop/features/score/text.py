@@ -49,73 +49,71 @@ from heavytop.report.render.text import Lines, wrapped
 
 
 _MEANINGS = {
-    "gamma_down": ("γ points down", ": with −γ they fit"),
-    "omega_reversed": ("Ω has the other sign", ": with −Ω they fit"),
-    "both_reversed": ("Ω and γ both have the other sign", ": with −Ω and −γ they fit"),
-    "omega_in_degrees": ("Ω is in degrees per time unit", ", not in radians"),
-    "omega_in_turns": ("Ω is in turns per time unit", ", not in radians"),
-    "omega_in_rpm": ("Ω is in turns per 60 time units", " (rpm where times are in s), not in radians"),
+    "gamma_down": "γ points down",
+    "omega_reversed": "Ω has the opposite sign",
+    "both_reversed": "Ω and γ have the opposite sign",
+    "omega_in_degrees": "Ω is in degrees per time unit, not in radians",
+    "omega_in_turns": "Ω is in turns per time unit, not in radians",
+    "omega_in_rpm": "Ω is in turns per 60 time units (rpm if times are in s), not in radians",
 }
-"""Readings of the columns, and how they fit."""
+"""Readings of the columns."""
 _CONVENTION_SENTENCES = {
-    **{kind: "".join(_MEANINGS[kind]) for kind in _MEANINGS if "_in_" in kind},
-    "scalar_last": "The quaternions have their scalar part in the other place: quaternion_order = {quaternion_order}",
+    **_MEANINGS,
+    "scalar_last": "The scalar part of the quaternions is at the other end: quaternion_order = {quaternion_order}",
     "conjugate": "The quaternions are conjugate: quaternion = {quaternion}",
-    "scalar_last_conjugate": "The quaternions are conjugate and have their scalar part in the other place",
+    "scalar_last_conjugate": "The quaternions are conjugate, and their scalar part is at the other end",
     "transposed": "The matrices are transposed: matrix = {matrix}",
     "degrees": "The angles are in {unit}",
-    "sequence": "The Euler angles are those of the sequence {sequence}",
-    "extrinsic": "The Euler angles are about axes of space (extrinsic): those of {sequence}, one after the other",
-    "angles_negated": "The Euler angles have the other sign",
+    "sequence": "The Euler angles have the sequence {sequence}",
+    "extrinsic": "The Euler angles are extrinsic, about space axes: {sequence}",
+    "angles_negated": "The Euler angles have the opposite sign",
     "angles_of_inverse": "The Euler angles are those of the inverse rotation, from space to body",
     "omega_frame": "Ω is in {frame} axes: {key}",
-    "omega_reversed": "Ω has the other sign",
-    "omega_scaled": "Ω is {factor} times what fits",
-    "momentum": "The columns of Ω are the angular momentum M = I Ω",
-    "gamma_down": "γ points down: with −γ it fits",
+    "omega_scaled": "Ω is scaled by {factor}",
+    "momentum": "The columns of Ω contain the angular momentum M = I Ω",
     "up": "Another axis points up: up = {up}",
     "left_handed": "The axes are left-handed: the {axis} axis is reversed",
-    "inertia_about": "The inertia tensor is that about the {about}",
-    "steiner": "The inertia tensor is the one that is given and {times} times its Steiner term, m (r² 1 − r rᵀ): one "
-    "about the fixed point was taken for one about the centre of mass, or the other way round",
-    "weight": "The weight is {factor} times the one that is given",
-    "mass": "The mass is {factor} times the one that is given, in the weight and in the Steiner term",
-    "top": "{number} of the body is {factor} times the one that is given",
-    "start": "The motion starts elsewhere: turned by {angle} degrees, with Ω = ({omega}) in body axes",
-    "column_scaled": "{column} is {factor} times what fits",
-    "column_order": "The columns of {columns} stand in each other's place",
-    "no_gravity": "There is no gravity in this motion: gravity = 0 fits",
-    "free_about_centre_of_mass": "The body turns freely about its centre of mass: it is not held at the fixed point",
-    "tensor_axes_conjugated": "The principal axes of the inertia tensor are turned the other way: Qᵀ D Q for Q D Qᵀ",
-    "omega_zero": "Ω is 0 in every sample, and the other columns fit: it was not written",
-    "omega_shifted": "Ω is that of other times: the one given at t is that at t {shift}",
-    "times_shifted": "The times are shifted: the state given at t is that at t {shift}",
-    "gravity_sign": "Gravity pulls the other way: g has the other sign, or the third axis of space points down",
-    "gravity_unit": "Gravity has another unit: the weight is {factor} times the one that is given",
-    "products_of_inertia": "The products of inertia have the other sign: what is asked for is I12 = −∫xy dm, and so on",
-    "centre_reversed": "The centre of mass is on the opposite side: −centre, as from the centre to the fixed point",
+    "inertia_about": "The inertia tensor is about the {about}",
+    "steiner": "The tensor given plus {times} times its Steiner term m (r² 1 − r rᵀ) fits: its reference point is not "
+    "the one given",
+    "weight": "The weight is {factor} times the weight given",
+    "mass": "The mass is {factor} times the mass given, in the weight and in the Steiner term",
+    "top": "{number} is {factor} times the value given",
+    "start": "The start differs: rotated by {angle} degrees, with Ω = ({omega}) in body axes",
+    "column_scaled": "{column} is scaled by {factor}",
+    "column_order": "The columns of {columns} are interchanged",
+    "no_gravity": "The motion is without gravity: gravity = 0 fits",
+    "free_about_centre_of_mass": "The body rotates freely about its centre of mass: it is not held at the fixed point",
+    "tensor_axes_conjugated": "The rotation of the principal axes is inverted: Qᵀ D Q in place of Q D Qᵀ",
+    "omega_zero": "Ω is 0 in every sample, and the other columns fit: Ω was not written",
+    "omega_shifted": "Ω is shifted in time: Ω given at t belongs to t {shift}",
+    "times_shifted": "The times are shifted: the state given at t belongs to t {shift}",
+    "gravity_sign": "Gravity is reversed: g has the opposite sign, or the third space axis points down",
+    "gravity_unit": "Gravity is in another unit: the weight is {factor} times the weight given",
+    "products_of_inertia": "The products of inertia have the opposite sign: the definition is I12 = −∫xy dm",
+    "centre_reversed": "The centre of mass is on the opposite side: −centre, as measured from the centre of mass",
     "centre_signs": "The centre of mass is at ({centre})",
-    "centre_unit": "The centre of mass has another unit of length: {factor} times the one that is given",
-    "inertia_unit": "The moments of inertia have another unit: {factor} times those that are given",
-    "inertia_axes": "The axes of the inertia tensor are in another order: those of axes {axes} as 1, 2, 3",
-    "centre_axes": "The axes of the centre of mass are in another order: those of axes {axes} as 1, 2, 3",
-    "body_data_axes": "Tensor and centre have their axes in another order: those of axes {axes} as 1, 2, 3",
-    "inertia_in_space_axes": "The inertia tensor is given in the axes of space at t = 0, not in those of the body",
-    "centre_in_space_axes": "The centre of mass is given in the axes of space at t = 0, not in those of the body",
-    "data_in_space_axes": "Tensor and centre are given in the axes of space at t = 0, not in those of the body",
-    "displacement": "The positions are displacements from the first one",
-    "position_reversed": "The positions have the other sign: from the centre of mass to the fixed point",
-    "position_unit": "The positions have another unit of length: they are {factor} times what fits",
+    "centre_unit": "The centre of mass is in another unit of length: {factor} times the vector given",
+    "inertia_unit": "The moments of inertia are in another unit: {factor} times those given",
+    "inertia_axes": "The axes of the inertia tensor are permuted: axes {axes} as 1, 2, 3",
+    "centre_axes": "The axes of the centre of mass are permuted: axes {axes} as 1, 2, 3",
+    "body_data_axes": "The axes of tensor and centre of mass are permuted: axes {axes} as 1, 2, 3",
+    "inertia_in_space_axes": "The inertia tensor is in space axes at t = 0, not in body axes",
+    "centre_in_space_axes": "The centre of mass is in space axes at t = 0, not in body axes",
+    "data_in_space_axes": "Tensor and centre of mass are in space axes at t = 0, not in body axes",
+    "displacement": "The positions are displacements from the first position",
+    "position_reversed": "The positions have the opposite sign: from the centre of mass to the fixed point",
+    "position_unit": "The positions are in another unit of length: they are scaled by {factor}",
     "position_of_centre": "The positions are those of the centre of mass, not of the point",
-    "point": "The positions are those of another point of the body, ({point}) in its axes",
+    "point": "The positions are those of another point of the body: ({point}) in its axes",
     "pivot": "The fixed point is elsewhere: the positions are shifted by ({offset}) in axes whose third points up",
     "point_and_pivot": "The positions are those of the point ({point}) of the body, shifted by ({offset})",
-    "space_axes": "The axes of space are in another order or reversed: x, y, z are axes {axes}",
-    "body_axes": "The axes of the body are in another order or reversed: 1, 2, 3 are axes {axes}",
-    "space_turned": "The axes of space are turned by {angle} degrees",
-    "body_turned": "The axes of the body are turned by {angle} degrees",
-    "quaternion_length": "The quaternions have not length 1: it is off by {off} at t = {t}. Their directions are "
-    "scored, and the length counts as an error; --normalize leaves it out",
+    "space_axes": "The space axes are permuted or reversed: x, y, z are axes {axes}",
+    "body_axes": "The body axes are permuted or reversed: 1, 2, 3 are axes {axes}",
+    "space_turned": "The space axes are rotated by {angle} degrees",
+    "body_turned": "The body axes are rotated by {angle} degrees",
+    "quaternion_length": "The quaternions do not have length 1: it is off by {off} at t = {t}. Their directions "
+    "are scored, and the length counts as an error, unless --normalize is given",
     "columns_disagree": "Columns contradict each other: {columns} differ by {by}, from t = {t} on",
 }
 
@@ -133,24 +131,24 @@ def sentence(fit: Diagnosis) -> str:
     if fit.error is None or fit.left is None:
         return f"{said}."
     if fit.numbers.get("of") == "rates":
-        return f"{said}: they differ by {fit.left:.2e} of Ω with it, by {fit.error:.2e} without."
+        return f"{said}: the relative difference is {fit.left:.2e} if so, and {fit.error:.2e} if not."
     digits = -math.log10(max(fit.left, FLOOR))
     more = " or more" if fit.left < FLOOR else ""
     left = f"less than {FLOOR:.0e}" if more else f"{fit.left:.2e}"
     fall = f"the largest error relative to the size of each quantity falls from {fit.error:.2e} to {left}"
-    text = f"{said}. Found by computing the motion that follows: {fall}, so that {digits:.1f} digits{more} are right."
-    return text + (f" As well fits: {'. Or: '.join(map(_mistake, fit.others))}." if fit.others else "")
+    text = f"{said}. With this corrected, {fall}, and {digits:.1f} digits{more} are right."
+    return text + (f" Equally good: {'. Or: '.join(map(_mistake, fit.others))}." if fit.others else "")
 
 
 def _mistake(fit: Diagnosis) -> str:
     numbers = fit.numbers
     said = "; ".join(_CONVENTION_SENTENCES[kind].format(**numbers) for kind in fit.kind.split("+"))
-    said += f" ({numbers['entries']} alone)" if "entries" in numbers else ""
-    said += f" ({numbers['steps']} of the method)" if "steps" in numbers else ""
+    said += f" ({numbers['entries']} only)" if "entries" in numbers else ""
+    said += f" ({numbers['steps']})" if "steps" in numbers else ""
     where = {
-        "columns": ", in the columns but not in the start",
-        "start": ", in the start but not in the columns",
-        "rates": ". Found by comparing Ω with the rate at which the attitude turns, which needs no reference",
+        "columns": ", in the columns only",
+        "start": ", in the start only",
+        "rates": ". Ω was compared with the rate of the attitude, without a reference",
     }
     return said + where.get(numbers.get("of", ""), "")
 
@@ -162,61 +160,60 @@ _SENTENCES = {
     "no_gravity": "The states fit a motion without gravity, P = 0",
     "momentum": "The first three columns are the angular momentum M = (I1Ω1, I2Ω2, I3Ω3), not Ω",
     "momentum_gamma_down": "The first three columns are the angular momentum M, not Ω, and γ points down",
-    "columns_swapped": "γ stands before Ω in these states",
-    "weight_sign": "The states fit a top whose weight P has the other sign, as where γ points down in start and states",
-    "rotor_sign": "The states fit a rotor of −k: the momentum of the rotor has the other sign",
-    "start_gamma_sign": "The states fit a start with −γ: γ of the start has the other sign",
-    "start_omega_sign": "The states fit a start with −Ω: Ω of the start has the other sign",
+    "columns_swapped": "γ precedes Ω in these states",
+    "weight_sign": "The states fit the weight −P, as when γ points down in start and states",
+    "rotor_sign": "The states fit the rotor −k",
+    "start_gamma_sign": "The states fit the start with −γ",
+    "start_omega_sign": "The states fit the start with −Ω",
     "start_momentum": "The start gives the angular momentum M in place of Ω",
     "all_momentum": "Start and states give the angular momentum M in place of Ω",
     "all_in_degrees": "Start and states give Ω in degrees per time unit, not in radians",
     "all_in_turns": "Start and states give Ω in turns per time unit, not in radians",
-    "all_in_rpm": "Start and states give Ω in turns per 60 time units (rpm where times are in s), not in radians",
-    "time_reversed": "The states are those of the times with the other sign",
+    "all_in_rpm": "Start and states give Ω in turns per 60 time units (rpm if times are in s), not in radians",
+    "time_reversed": "The states are those at −t",
     "start_row_missing": "The first state is the start: the states are one row late, and the row t = 0 is missing",
-    "rows_off_by_one": "Each state is that of the next time: the states are one row early",
-    "rows_late": "Each state is that of the time before: the states are one row late",
-    "kinematic_sign": "The states solve γ' = Ω × γ: the equation of γ has the other sign",
-    "gyroscopic_sign": "The states solve M' = Ω × M + P γ × r: the product of M and Ω has the other sign",
-    "both_signs": "The states solve M' = Ω × M + P γ × r and γ' = Ω × γ: both products with Ω have the other sign",
+    "rows_off_by_one": "Each state belongs to the next time: the states are one row early",
+    "rows_late": "Each state belongs to the previous time: the states are one row late",
+    "kinematic_sign": "The states solve γ' = Ω × γ, with the opposite sign",
+    "gyroscopic_sign": "The states solve M' = Ω × M + P γ × r, with the opposite sign of M × Ω",
+    "both_signs": "The states solve M' = Ω × M + P γ × r and γ' = Ω × γ, with opposite signs of M × Ω and γ × Ω",
     "rows_reversed": "The states are listed from the last time to the first",
-    "axes_permuted": "The axes are in another order or reversed: {columns_said}",
-    "columns": "The columns mean something else: {columns_said}",
-    "inertia_axes": "The axes of the moments of inertia are in another order: the states fit with those of {order}",
-    "centre_axes": "The axes of the centre of mass are in another order: the states fit with those of {order}",
-    "top_axes": "The axes of the top are in another order: the states fit with those of {order}",
+    "axes_permuted": "The axes are permuted or reversed: {columns_said}",
+    "columns": "The columns have another meaning: {columns_said}",
+    "inertia_axes": "The moments of inertia are permuted: the states fit {order}",
+    "centre_axes": "The axes of the centre of mass are permuted: the states fit {order}",
+    "top_axes": "The axes of the top are permuted: the states fit {order}",
     "centre_signs": "The states fit a centre of mass at ({centre})",
     "system": "The states fit the system {other_system}, not {system}",
-    "times_shifted": "The times are shifted: the state given at t is that at t {signed}",
-    "component_sign": "The equation of {column} has the other sign: the states fit with its derivative negated",
-    "term_missing": "The equation of {column} lacks {term}: the states fit without it",
-    "term_sign": "In the equation of {column} {term} has the other sign: the states fit so",
+    "times_shifted": "The times are shifted: the state given at t belongs to t {signed}",
+    "component_sign": "The equation of {column} has the opposite sign",
+    "term_missing": "The equation of {column} lacks {term}",
+    "term_sign": "In the equation of {column}, {term} has the opposite sign",
     "weight": "The states fit another weight: {named}",
     "start": "The states fit another start: {named}",
     "top": "The states fit another top: {named}",
-    "one_state": "Only the state at t = {t} is off (state {state})",
-    "some_states": "Only the states at t = {t} are off (states {state})",
-    "omega_scaled": "Ω is {factor} times what fits in these states: divided by it they fit",
-    "gamma_scaled": "γ is {factor} times what fits in these states: divided by it they fit",
-    "column_scaled": "{column} is {factor} times what fits in these states: divided by it they fit",
-    "column_negated": "{column} has the other sign in these states",
-    "column_constant": "{column} is {value} in every state: the other five columns fit",
-    "all_scaled": "Start and states give {factor}·Ω: with both divided by it they fit",
-    "row_missing": "A row is missing: from t = {t} on, the states are those of the next times",
-    "row_twice": "A row too many: from t = {t} on, the states are those of the times before",
-    "column_order": "The columns stand in another order: they are {columns}",
-    "axes_of_space": "{whose} given in axes fixed in space, of which axis {vertical} is vertical",
-    "frozen": "From t = {t} on {still} the same.",
-    "constant": "Every state is the same: nothing moves.",
-    "reset": "From t = {t} on the motion starts again: the program went back to its start",
-    "clock": "The times are off multiples of the step {step} by {off} at most, as a sum of steps is: at the multiples "
-    "themselves {digits} digits are right",
-    "significant": "The states are rounded to {digits} significant digits, which explains the error: {in_full}",
-    "decimals": "The states are rounded to {digits} decimals, which explains the error: {in_full}",
-    "single": "The states are rounded to single precision (24 bits), which explains the error: {in_full}",
+    "one_state": "Only the state at t = {t} is wrong (state {state})",
+    "some_states": "Only the states at t = {t} are wrong (states {state})",
+    "omega_scaled": "Ω is scaled by {factor} in these states",
+    "gamma_scaled": "γ is scaled by {factor} in these states",
+    "column_scaled": "{column} is scaled by {factor} in these states",
+    "column_negated": "{column} has the opposite sign in these states",
+    "column_constant": "{column} is {value} in every state; the other five columns fit",
+    "all_scaled": "Start and states give {factor}·Ω in place of Ω",
+    "row_missing": "A row is missing: from t = {t} on, each state belongs to the next time",
+    "row_twice": "There is one row too many: from t = {t} on, each state belongs to the previous time",
+    "column_order": "The columns are in another order: {columns}",
+    "axes_of_space": "{whose} given in space axes, of which axis {vertical} is vertical",
+    "frozen": "From t = {t} on, {still}.",
+    "constant": "All states are the same.",
+    "reset": "At t = {t} the motion starts again from its start",
+    "clock": "The times differ by up to {off} from multiples of the step {step}, like a sum of steps: at the multiples "
+    "{digits} digits are right",
+    "significant": "The states are rounded to {digits} significant digits, which explains the error.",
+    "decimals": "The states are rounded to {digits} decimals, which explains the error.",
+    "single": "The states are rounded to single precision (24 bits), which explains the error.",
 }
 """The sentences of the other kinds, of ``rounded`` by what the states are rounded to."""
-_IN_FULL = "written in full they may be better."
 _SYSTEM = {"heavy_top": "gyrostat", "gyrostat": "heavy_top", "heavy_gyrostat": "heavy_top"}
 _WHOSE = {"omega": "Ω is", "both": "Ω and γ are"}
 
@@ -246,7 +243,7 @@ def _scope(fit: Diagnosis) -> str:
     if fit.looked_at is None:
         return ""
     looked, states, until = fit.looked_at
-    return f"Looked at {looked} of the {states} states, to t = {until}. "
+    return f"Compared {looked} of {states} states, to t = {until}. "
 
 
 def _size(value: float) -> str:
@@ -256,7 +253,7 @@ def _size(value: float) -> str:
 def _said(fit: Diagnosis, system: str) -> str:
     numbers = fit.numbers
     if fit.kind in _MEANINGS:
-        return " in these states".join(_MEANINGS[fit.kind])
+        return f"In these states {_MEANINGS[fit.kind]}"
     if fit.kind == "time_unit":
         return _time_unit(**numbers)
     kind = "column_negated" if (fit.kind, numbers.get("factor")) == ("column_scaled", "-1") else fit.kind
@@ -270,23 +267,24 @@ def _said(fit: Diagnosis, system: str) -> str:
         "other_system": _SYSTEM.get(system, ""),
         "signed": _signed(numbers.get("shift", "")),
         "whose": _WHOSE.get(numbers.get("of", ""), ""),
-        "in_full": _IN_FULL,
         "still": _still(**numbers) if fit.kind == "frozen" else "",
     }
     return text.format(**numbers | more)
 
 
 def _still(states: str, vector: str = "", **_: str) -> str:
-    return f"{vector} does not move: in {states} states it is" if vector else f"nothing moves: {states} states are"
+    return f"{vector or 'the state'} is constant, in {states} states"
 
 
 def _time_unit(factor: str, steps: str = "") -> str:
-    where = f"the state given at t is that at {factor}·t"
+    where = f"the state given at t belongs to {factor}·t"
     if not steps:
-        return f"The time has another unit: {where}"
+        return f"The times are in another unit: {where}"
     n, off = abs(int(steps)), "long" if int(steps) > 0 else "short"
     taken = n + (1 if int(steps) > 0 else -1)
-    return f"Each interval is one step too {off} ({taken} steps of 1/{n} of it), or the time has another unit: {where}"
+    return (
+        f"Each interval is one step too {off} ({taken} steps of 1/{n} of it), or the times are in another unit: {where}"
+    )
 
 
 def _signed(shift: str) -> str:
@@ -297,9 +295,9 @@ def _columns(numbers: dict[str, str]) -> str:
     parts = []
     if "meaning" in numbers:
         meaning = numbers["meaning"]
-        parts.append(_MEANINGS[meaning][0] if meaning in _MEANINGS else _SENTENCES[meaning])
+        parts.append(_MEANINGS.get(meaning) or _SENTENCES[meaning])
     if "order" in numbers:
-        parts.append("γ stands before Ω")
+        parts.append("γ precedes Ω")
     if "axes" in numbers:
         vectors = {"both": "Ω and γ", "omega": "Ω", "gamma": "γ"}.get(numbers.get("of", ""), "")
         axes = ", ".join(axis.replace("-", "−") for axis in numbers["axes"].split(","))
@@ -334,9 +332,9 @@ _OBSERVED = {
     "position_error_relative": "position, relative",
 }
 _DIRECTIONS = {
-    "along": "The error is mostly along the flow, that is in phase.",
+    "along": "The error is mostly along the flow (phase error).",
     "across": "The error is mostly across the flow.",
-    "both": "The error is along and across the flow alike.",
+    "both": "The errors along and across the flow are similar.",
 }
 
 
@@ -348,8 +346,11 @@ def answer(row: Row, peer: Peer | None) -> list[str]:
         lines.append(f"The run ended early ({row.outcome}), at t = {short(row.time_reached)} of {short(row.horizon)}.")
     if digits is None:
         drifts = any(metric.quantity and metric.quantity.name == DRIFT for metric in row.metrics.values())
-        unknown = "How many digits are right is not known: there is no reference." + " Drift is measured." * drifts
-        return [*lines, unknown if row.samples else "No digit can be counted: the first state is not finite."]
+        unknown = "The number of digits right is unknown: there is no reference." + " Drift is measured." * drifts
+        return [
+            *lines,
+            unknown if row.samples else "The number of digits right is unknown: the first state is not finite.",
+        ]
     where = "every sample up to" if row.samples > 1 else "its one sample,"
     said = f"{digits_text(digits)} of {digits_of(row.bits)} digits right at {where} T = {short(row.time_reached)}"
     if peer is not None:
@@ -363,17 +364,17 @@ def answer(row: Row, peer: Peer | None) -> list[str]:
 
 def requirement(row: Row, needed: Fraction, cut: str = "") -> str:
     """Whether as many digits are right as are required, in a sentence; ``cut`` as in :func:`passed`."""
-    asked = f"{float(needed):g} digits are required"
+    asked = f"{float(needed):g} digits required"
     kept, good = digits_right(row), passed(row, needed, cut)
     # rounded down, so that what is not enough does not look so
     shown = "" if kept is None else f"{math.floor(kept * 1000) / 1000:g}"
     if good is not None:
-        return f"{asked}: " + ("they are right." if good else f"{shown} are right.")
+        return f"{asked}: " + ("satisfied." if good else f"only {shown} are right.")
     if row.outcome != "success":
-        return f"{asked}: not known, for the run ended early."
+        return f"{asked}: unknown, because the run ended early."
     if cut:
-        return f"{asked}: not known, for {cut}, and later rows are not scored."
-    return f"{asked}: not known, for " + ("there is no reference." if kept is None else f"{shown} are resolved.")
+        return f"{asked}: unknown, because {cut}, and later rows are not scored."
+    return f"{asked}: unknown, because " + ("there is no reference." if kept is None else f"only {shown} are resolved.")
 
 
 def guessed(assessment: Assessment) -> str | None:
@@ -381,8 +382,8 @@ def guessed(assessment: Assessment) -> str | None:
     if not assessment.format_guessed:
         return None
     name = assessment.row.precision
-    said = f"No format is named; {name} is the narrowest, from double on, that holds the digits written."
-    single = " Every number in the states is one of single precision (24 bits): perhaps they were computed in it."
+    said = f"The format is not declared; {name} is the narrowest, from double on, that holds the digits written."
+    single = " All numbers of the states are in single precision (24 bits), in which they may have been computed."
     return said + (single if assessment.single else "")
 
 
@@ -482,8 +483,8 @@ def one_motion(row: Row, beside: Beside) -> Iterator[Block]:
         yield Card("Remarks", remarks, note=compared, shown=In.FULL | In.PAGE)
     yield Chart(digits_over_time)
     units = (
-        "Errors of Ω in 1/time unit, of γ in units of |γ| = 1; along and across the flow: of the six numbers together, "
-        "which depends on the unit of time; drift of each first integral in its own units."
+        "Errors of Ω are in 1/time unit, of γ in units of |γ|; along and across the flow, of all six components, "
+        "and depend on the unit of time. The drift of each first integral is in its own units."
     )
     yield Table("Errors and drift", _SIZES, sizes(row), [units], shown=In.FULL | In.PAGE)
 
@@ -495,7 +496,7 @@ def _not_drawn(row: Row, held: Iterable[Series], right: Callable[[float], float]
         most, drawn = series.quantity and row.metrics.get(series.quantity.over("max").text), points(series)[1]
         if most and most.log10 is not None and drawn and most.log10 > max(drawn) + _BETWEEN:
             lacking.append(right(most.log10))
-    return [f"Between them the fewest digits right are {min(lacking):.1f}."] if lacking else []
+    return [f"Between these samples the fewest digits right are {min(lacking):.1f}."] if lacking else []
 
 
 _BETWEEN = 0.1

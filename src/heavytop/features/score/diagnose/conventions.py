@@ -314,7 +314,7 @@ def _scalable(body: BodyData) -> Iterator[tuple[str, dict[str, str], str, Any]]:
     for i, unit in enumerate(numpy.eye(3)):
         yield "top", {"number": f"I{i + 1}{i + 1}"}, "inertia", numpy.diag(unit)
         if body.centre[i]:
-            yield "top", {"number": f"Number {i + 1} of the centre"}, "centre", unit
+            yield "top", {"number": f"Component {i + 1} of the centre of mass"}, "centre", unit
 
 
 def _refined(
