@@ -21,12 +21,22 @@ from heavytop.features.claims.algebra.elliptic import FREE, JACOBI, WEIERSTRASS
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.functions import INVERSE, Refine, Transcendental
 from heavytop.features.claims.algebra.rational import Tower, forces_zero
-from heavytop.features.claims.algebra.ring import Generator, Quotient, Unprovable, as_fraction, used, where_provable
+from heavytop.features.claims.algebra.ring import (
+    SLOTS,
+    Generator,
+    Quotient,
+    Unprovable,
+    as_fraction,
+    used,
+    where_provable,
+)
 from heavytop.features.claims.algebra.signs import NUMBER_BITS, PLUS, UNKNOWN, Sign
 from heavytop.features.claims.algebra.structure import Defined
 
 _MAX_EXPONENT = 64
 _MAX_REFINEMENTS = 12
+_SPARE = 8
+"""Generators that a proof may add to a field: 3 at most in the library."""
 _HYPERBOLIC = ("tanh", "sech", "sinh", "cosh", "coth", "csch")
 
 
@@ -85,9 +95,20 @@ class Field:
         self._divisors: list[int] = []
         self._complete = False
         expressions = list(expressions)
+        few, many = SLOTS
+        try:
+            self._build(expressions, few)
+        except Unprovable:
+            if len(self.tower.generators) <= few - _SPARE:
+                raise
+        if len(self.tower.generators) > few - _SPARE:
+            self._complete = False
+            self._build(expressions, many)
+
+    def _build(self, expressions: list[sympy.Expr], slots: int) -> None:
         for _ in range(_MAX_REFINEMENTS):
             try:
-                self._reset()
+                self._reset(slots)
                 for expression in expressions:
                     self.enter(expression)
             except Refine:
@@ -96,8 +117,8 @@ class Field:
             return
         raise Unprovable("The arguments of the exponentials have no common measure.")
 
-    def _reset(self) -> None:
-        self.tower = Tower()
+    def _reset(self, slots: int) -> None:
+        self.tower = Tower(slots)
         self._known: dict[Any, Quotient] = {}
         self._roots: dict[int, sympy.Expr] = {}
         self.transcendental = Transcendental(self, self._divisors)

@@ -119,8 +119,8 @@ _FACTORED_BITS = 64
 class Tower(PolynomialRing):
     """Generators with relations and signs, and the absolute values and roots of quotients."""
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, slots: int) -> None:
+        super().__init__(slots)
         self._roots: dict[str, int] = {}
         self.signs = Signs(self)
 

@@ -12,7 +12,8 @@ from flint import Ordering, fmpq, fmpq_mpoly, fmpq_mpoly_ctx
 
 from heavytop.errors import HeavyTopError
 
-SLOTS = 64
+SLOTS = 32, 64
+"""Generators that a ring has room for: time grows with the room, and the paper's claims need 21."""
 _MAX_PRODUCT = 10_000
 """Terms of a product: the paper's claims need 95; proofs that need many more do not end."""
 _MAX_QUOTIENT = 1_500
@@ -123,11 +124,11 @@ class Generator:
 class PolynomialRing:
     """Generators with the relations R² = q of the roots among them, and polynomials modulo these.
 
-    squares: q of each root, by its index.
+    slots: the room for generators.  squares: q of each root, by its index.
     """
 
-    def __init__(self) -> None:
-        self.context = fmpq_mpoly_ctx.get([f"x{index}" for index in range(SLOTS)], Ordering.lex)
+    def __init__(self, slots: int) -> None:
+        self.context = fmpq_mpoly_ctx.get([f"x{index}" for index in range(slots)], Ordering.lex)
         self.gens = self.context.gens()
         self.generators: list[Generator] = []
         self.squares: dict[int, fmpq_mpoly] = {}
@@ -137,8 +138,10 @@ class PolynomialRing:
 
     def add(self, generator: Generator) -> int:
         """The index of a new free generator."""
-        if len(self.generators) == SLOTS:
-            raise Unprovable(f"More than {SLOTS} independent quantities.", "Split the claim into smaller ones.")
+        if len(self.generators) == len(self.gens):
+            raise Unprovable(
+                f"More than {len(self.gens)} independent quantities.", "Split the claim into smaller ones."
+            )
         self.generators.append(generator)
         return len(self.generators) - 1
 

@@ -87,8 +87,8 @@ _MAX_PRODUCTS = 150
 _MAX_DEGREE_OF_PRODUCTS = 4
 _PROGRAMS = 30
 _MOST_FACTORED = 10_000
-_factors: dict[str, Any] = {}
-"""Factors of polynomials by their texts: all rings have the same names of generators, in one context of FLINT."""
+_factors: dict[tuple[int, str], Any] = {}
+"""Factors of polynomials by room for generators and text: rings of the same room share one context of FLINT."""
 
 
 class Signs:
@@ -173,7 +173,7 @@ class Signs:
 
     def factors(self, p: fmpq_mpoly) -> Any:
         """(constant, [(factor, power)]), computed once for all rings."""
-        key = str(p)
+        key = len(self._ring.gens), str(p)
         if key not in _factors:
             if len(_factors) == _MOST_FACTORED:
                 _factors.clear()
