@@ -152,7 +152,7 @@ def test_a_state_off_its_condition_by_1e_200_refutes_nothing():
     assert audited(integral("Omega3", FREE, ["Omega1", "Omega2"], [on, off])).verdict == "holds"
     report = audited(integral("Omega3", FREE, ["Omega1", "Omega2"], [off]))
     assert report.verdict == "undecided"
-    assert "E-200, Omega1 is not 0" in open_conditions(report)
+    assert "e-200, Omega1 is not 0" in open_conditions(report)
 
 
 def test_a_parameter_off_a_relation_by_1e_400_is_refused():

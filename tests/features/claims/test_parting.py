@@ -71,7 +71,7 @@ def test_before_it_nothing_parts_and_the_horizon_itself_counts() -> None:
 def test_a_limit_that_is_touched_and_not_passed_is_no_number(monkeypatch: pytest.MonkeyPatch) -> None:
     # a claim that parts by less than the limit provably does not; one that is undecidable is refused, not guessed
     monkeypatch.setattr(module._Pair, "reached", lambda *_: False)
-    with pytest.raises(OutOfReach, match="apart"):
+    with pytest.raises(OutOfReach, match="differ by only 1 %"):
         divergence_time(case(2), HORIZON, "smooth")
 
 
