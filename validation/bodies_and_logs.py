@@ -541,7 +541,7 @@ def logs_of(g: Motion, f: Motion) -> Iterator[tuple[str, str, str | bytes, str]]
         "two rows at one time",
         "csv",
         "\n".join([*lines[:12], lines[11][:-9] + "000000000", *lines[12:]]),
-        "of one time and differ",
+        "the same time and differ",
     )
     yield "a reset", "csv", "\n".join([*lines, *lines[-20:]]), ""
     yield "free, omega alone", "csv", table(f, "t,omega1,omega2,omega3", f.omega), ""

@@ -19,7 +19,7 @@ _PLAIN = re.compile(r"[+-]?\d{1,40}(\.\d{0,40})?([eE][+-]?\d{1,3})?")
 """Most numbers; all of these are within the limits."""
 _WIDEST = 20_000
 """The largest exponent of 2 in a file: quad has 16,384, and larger powers take minutes."""
-_REMEDY = "`heavytop docs score` shows both forms of the file."
+_REMEDY = "`heavytop docs score` describes both file formats."
 _SAMPLE = 600
 """The most numbers from which the format is inferred."""
 

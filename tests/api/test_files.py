@@ -31,7 +31,7 @@ def test_a_comment_of_a_table_that_stands_twice_is_refused(tmp_path: Path) -> No
     file.write_text(f"{head}# made: again\n{body}")
     assert read(file).top.weight == 1
     file.write_text(f"{head}# weight: 2\n{body}")
-    with pytest.raises(ht.InputError, match="The key weight stands twice"):
+    with pytest.raises(ht.InputError, match="The key weight occurs twice"):
         read(file)
 
 

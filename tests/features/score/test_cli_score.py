@@ -281,7 +281,7 @@ def test_numbers_of_single_precision_are_noticed(tmp_path: Path) -> None:
     (tmp_path / "comma.csv").write_text(decimal)
     with pytest.raises(InputError) as caught:
         read_file(tmp_path / "comma.csv", CASE)
-    assert caught.value.remedy == "Are these decimal commas? Separate the columns by semicolons."
+    assert caught.value.remedy == "For decimal commas, separate the columns by semicolons."
 
 
 @pytest.mark.parametrize(

@@ -263,7 +263,7 @@ def test_repeated_times_are_one_row_or_an_error_and_a_reset_ends_the_log(tmp_pat
     path = tmp_path / "log.csv"
     assert digits(path, plain([*lines[:5], lines[4], *lines[5:]])) > 13
     other = lines[4].replace(",0.", ",-0.", 1)
-    assert "Lines 12 and 13 are of one time and differ" in refusal(path, plain([*lines[:5], other, *lines[5:]]))
+    assert "Lines 12 and 13 have the same time and differ" in refusal(path, plain([*lines[:5], other, *lines[5:]]))
     path.write_text(plain([*lines[:8], *lines[:3]]))
     shown = heavytop("score", path)
     assert shown.returncode == 0
@@ -314,7 +314,7 @@ def test_a_table_without_a_header_and_one_of_a_longer_comment(tmp_path: Path) ->
     path = tmp_path / "log.csv"
     assert digits(path, HEAD + named + "\n".join(body)) > 13
     unnamed = HEAD + "\n".join(f"{k},imu,0,0,0,0,1" for k in range(11))
-    assert "'imu' of the first row is not a number" in refusal(path, unnamed)
+    assert "must be a header or numbers; got 'imu'" in refusal(path, unnamed)
 
 
 def test_rows_of_one_time_are_one_where_they_agree_to_the_digits_printed(tmp_path: Path) -> None:
@@ -322,7 +322,7 @@ def test_rows_of_one_time_are_one_where_they_agree_to_the_digits_printed(tmp_pat
     short = ",".join([lines[4].partition(",")[0], *(f"{float(text):.8f}" for text in lines[4].split(",")[1:])])
     path = tmp_path / "log.csv"
     assert digits(path, plain([*lines[:4], short, *lines[4:]])) > 13
-    assert "of one time and differ" in refusal(path, plain([*lines[:5], short[:-1] + "99", *lines[5:]]))
+    assert "the same time and differ" in refusal(path, plain([*lines[:5], short[:-1] + "99", *lines[5:]]))
 
 
 @pytest.mark.parametrize(
@@ -330,7 +330,7 @@ def test_rows_of_one_time_are_one_where_they_agree_to_the_digits_printed(tmp_pat
     [
         ("t,quatA,quatB,quatC,quatD", "looks like an attitude"),
         ("t,a_w,a_x,a_y,a_z,b_w,b_x,b_y,b_z", "Quaternions are in several columns"),
-        ("t,qpos[3],qpos[4],qpos[5],qpos[6]", "joint that is not said"),
+        ("t,qpos[3],qpos[4],qpos[5],qpos[6]", "is not declared"),
         ("t,rx,ry,rz,n", "# attitude: rotation vector"),
         ("t,cmd_orientation_w,cmd_orientation_x,cmd_orientation_y,cmd_orientation_z", "not found"),
     ],

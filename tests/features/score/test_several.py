@@ -74,7 +74,10 @@ def test_files_are_scored_in_parallel_and_a_bad_one_does_not_stop_the_others(tmp
 
 @pytest.mark.parametrize(
     ("words", "said"),
-    [(("b.csv", "--html", "page.html"), "one trajectory; got 2"), (("-",), "Standard input is one trajectory")],
+    [
+        (("b.csv", "--html", "page.html"), "single trajectory; got 2"),
+        (("-",), "Standard input must be the only trajectory"),
+    ],
 )
 def test_a_page_and_standard_input_are_of_one_trajectory(words: tuple[str, ...], said: str) -> None:
     done = heavytop("score", "a.csv", *words)

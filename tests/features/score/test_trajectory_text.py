@@ -71,7 +71,7 @@ def test_a_table_of_another_program_is_read_as_it_was_meant(text: str | bytes, t
 def test_hexadecimal_tables_and_columns_without_a_header_are_read(tmp_path: Path) -> None:
     rows = [[float(t).hex(), *(float(v).hex() for v in s)] for t, s in zip(TIMES, STATES, strict=True)]
     given = scored(tmp_path, "\n".join(" ".join(row) for row in rows), "a.dat")
-    assert given.notes == ("without a header the columns are taken as t omega1 omega2 omega3 gamma1 gamma2 gamma3",)
+    assert given.notes == ("columns without a header, read as t omega1 omega2 omega3 gamma1 gamma2 gamma3",)
     np.testing.assert_array_equal(np.array(given.states, float), STATES)
 
 
@@ -81,10 +81,10 @@ def test_the_row_of_time_0_is_the_start_where_nothing_else_says_it(tmp_path: Pat
     assert given.start.flat == tuple(Fraction(repr(float(value))) for value in STATES[0])
     assert given.top == CASE.top
     rows = [[float(t), *state] for t, state in zip(TIMES, STATES, strict=True)][1:]
-    with pytest.raises(InputError, match="omega is missing, and no row t = 0") as caught:
+    with pytest.raises(InputError, match="omega is missing, and there is no row t = 0") as caught:
         scored(tmp_path, data + table(rows=rows), case=None)
     assert "--case" in caught.value.remedy
-    with pytest.raises(InputError, match="The only time is 0"):
+    with pytest.raises(InputError, match="No time other than 0"):
         scored(tmp_path, table(rows=[[0.0, *STATES[0]]]))
 
 
@@ -128,7 +128,7 @@ def test_the_units_of_a_header_are_those_of_its_numbers(
     assert [float(t) for t in given.times] == pytest.approx([float(t) for t in TIMES], rel=1e-15)
     np.testing.assert_allclose(np.array(given.states, float), STATES, rtol=2**-51)
     assert given.precision == DOUBLE
-    said = [note for note in given.notes if note.startswith("as the header says")]
+    said = [note for note in given.notes if note.startswith("as the header declares")]
     assert len(said) == (time != 1 or factors[0] != 1)
 
 
@@ -174,39 +174,39 @@ def test_a_body_is_compared_with_a_case_at_its_own_scale(size: Fraction, changed
     require_body(case, Body(**data))
     value = data[changed]
     data[changed] = [more * part for part in value] if isinstance(value, list) else more * value
-    with pytest.raises(InputError, match="in the case mine it is"):
+    with pytest.raises(InputError, match="but the case mine has"):
         require_body(case, Body(**data))
-    with pytest.raises(InputError, match="The file says Ω3"):
+    with pytest.raises(InputError, match="The file has Ω3"):
         require_case(case, top, State((0, 0, size * more), (0, 0, 1)), HEAVY_TOP, None)
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("# weight: 3\n" + table(), "The file says weight = 3, but in the case lagrange it is 2"),
-        ("# inertia: 3/2, 5/2, 5/2\n" + table(), "The file says I1 = 3/2"),
-        ("# system: gyrostat\n" + table(), "The file says system = gyrostat"),
-        ("# gamma: 2/7, 3/7, -6/7\n" + table(), "The file says γ3 = -6/7, but in the case lagrange it is 6/7"),
-        (table(order=(0, 4, 5, 6, 1, 2, 3)), "Ω1 of the row t = 0 = 0.285714, but in the case lagrange it is 1/5"),
+        ("# weight: 3\n" + table(), "The file has weight = 3, but the case lagrange has 2"),
+        ("# inertia: 3/2, 5/2, 5/2\n" + table(), "The file has I1 = 3/2"),
+        ("# system: gyrostat\n" + table(), "The file has system = gyrostat"),
+        ("# gamma: 2/7, 3/7, -6/7\n" + table(), "The file has γ3 = -6/7, but the case lagrange has 6/7"),
+        (table(order=(0, 4, 5, 6, 1, 2, 3)), "Ω1 of the row t = 0 = 0.285714, but the case lagrange has 1/5"),
         ("# wieght: 3\n" + table(), "Unknown key 'wieght'"),
-        (table("t,w1,w2,w3,w3,g2,g3"), "The column omega3 stands twice"),
-        (table("t,w0,w1,w3,g1,g2,g3"), "There are omega0 and omega3"),
+        (table("t,w1,w2,w3,w3,g2,g3"), "The column omega3 occurs twice"),
+        (table("t,w0,w1,w3,g1,g2,g3"), "The header has both omega0 and omega3"),
         (table("t,phi [deg],theta [rad],psi [deg],g1,g2,g3"), "in degrees and in radians"),
-        (table("t,w1 [deg/s],w2 [rad/s],w3 [deg/s],g1,g2,g3"), "has the omega in deg/s and in rad/s"),
-        (table("t,w1 [rpm],w2,w3,g1,g2,g3"), "has the omega in rpm and without a unit"),
+        (table("t,w1 [deg/s],w2 [rad/s],w3 [deg/s],g1,g2,g3"), "units of omega differ: in deg/s and in rad/s"),
+        (table("t,w1 [rpm],w2,w3,g1,g2,g3"), "units of omega differ: in rpm and without a unit"),
         (
             "# angles: degrees\n" + table("t,phi_rad,theta_rad,psi_rad,g1,g2,g3"),
-            "header says radians and angles = degrees",
+            "header declares radians, but angles = degrees",
         ),
         (table("t,a,b,c,d,e,f"), "The header is not t,omega1.*: omega1, omega2"),
         (table(None, order=range(3)), "without a header Row 1 has 3 columns, not 7"),
         (table() + "1,2\n", "Line 7 has 2 columns, not 7"),
-        (table() + "2,1,1,1,0,0,1\n", "Lines 6 and 7 are of one time and differ"),
+        (table() + "2,1,1,1,0,0,1\n", "Lines 6 and 7 have the same time and differ"),
         (table() + "3,1,1,1,0,0,abc\n", "Line 7, gamma3: 'abc' is not a finite number"),
         ("# centre: 0, 0, 0,5\n" + table(), "centre must be 3 numbers; got '0, 0, 0,5'"),
         ("# inertia: 2,5;2,5;1,5\n" + table(), "inertia must be 3 numbers; got '2,5;2,5;1,5'"),
         (HEADER + "\n" + "1,2,3,4,5,6,7\n" * 300_000, "300001 lines are too many.*"),
-        (b"t,\0", "holds a byte 0"),
+        (b"t,\0", "got a zero byte"),
     ],
 )
 def test_a_table_that_cannot_be_meant_is_refused(text: str | bytes, message: str, tmp_path: Path) -> None:
@@ -263,18 +263,18 @@ def test_xi_and_radii_that_heavytop_writes_itself_are_not_spoken_of() -> None:
     names = [*states, *own]
     table = "\n".join([",".join(names), ",".join("0" * len(names)), ",".join("1" * len(names))])
     assert read_table(table)[1] == []
-    assert unread([*own, "energy", "energies_radius"], names) == ["columns that are not read: energy, energies_radius"]
+    assert unread([*own, "energy", "energies_radius"], names) == ["ignored columns: energy, energies_radius"]
 
 
 @pytest.mark.parametrize(
     ("names", "message"),
     [
-        ("t,wx deg/s,wy deg/s,wz deg/s,gamma1,gamma2,gamma3", "'wx deg/s' begins like one of the angular velocity"),
-        ("t,wx_dps,wy_dps,wz_dps,gamma1,gamma2,gamma3", "'wx_dps' begins like one of the angular velocity"),
-        ("t,omega1 {rpm},omega2 {rpm},omega3 {rpm},qw,qx,qy,qz", "'omega1 {rpm}' begins like"),
-        ("t,omega1,omega2,omega3,gamma1 m,gamma2 m,gamma3 m", "'gamma1 m' begins like one of the gamma"),
-        ("t,qw,qx,qy,qz,x mm,y mm,z mm", "'x mm' begins like one of the position"),
-        ("t,x,y,z,w,x,y,z", "more than four may be a quaternion"),
+        ("t,wx deg/s,wy deg/s,wz deg/s,gamma1,gamma2,gamma3", "'wx deg/s' looks like one of angular velocity"),
+        ("t,wx_dps,wy_dps,wz_dps,gamma1,gamma2,gamma3", "'wx_dps' looks like one of angular velocity"),
+        ("t,omega1 {rpm},omega2 {rpm},omega3 {rpm},qw,qx,qy,qz", "'omega1 {rpm}' looks like"),
+        ("t,omega1,omega2,omega3,gamma1 m,gamma2 m,gamma3 m", "'gamma1 m' looks like one of gamma"),
+        ("t,qw,qx,qy,qz,x mm,y mm,z mm", "'x mm' looks like one of position"),
+        ("t,x,y,z,w,x,y,z", "more than four may belong to a quaternion"),
     ],
 )
 def test_a_quantity_is_not_passed_over_for_how_its_unit_is_written(names: str, message: str) -> None:
@@ -299,4 +299,4 @@ def test_what_is_of_another_quantity_is_left_out() -> None:
 )
 def test_a_unit_that_is_not_converted_is_named(header: str, said: str, tmp_path: Path) -> None:
     notes = [note for note in scored(tmp_path, table(header, ";")).notes if "not converted" in note]
-    assert notes == ([f"units of the header are not known, and were not converted: {said}"] if said else [])
+    assert notes == ([f"unknown units in the header, not converted: {said}"] if said else [])

@@ -55,10 +55,10 @@ def columns(arrays: Mapping[str, Any], states: list[list[Any]] | None) -> dict[s
     if states is not None:
         for name, part in (("omega", slice(0, 3)), ("gamma", slice(3, 6))):
             if name in rows_by_name:
-                raise InputError(f"states and {name} both give it.", "Give either of them.")
+                raise InputError(f"states and {name} were both given.", "Give one of them.")
             rows_by_name[name] = [row[part] for row in states]
     if not rows_by_name:
-        raise InputError("There is nothing to score.", "Give states, quaternions, positions or another array.")
+        raise InputError("Nothing to score was given.", "Give states, quaternions, positions or another array.")
     return {name: rows_by_name[name] for name in WIDTHS if name in rows_by_name}
 
 
@@ -265,7 +265,7 @@ def score(
     where = None if point is None else vector(point, "point")
     said = Convention(**words, pivot=vector(pivot, "pivot"), point=where)
     if "euler" in arrays and not said.sequence:
-        raise InputError("Euler angles need their sequence.", 'Give sequence, such as "ZXZ" or "ZYX".')
+        raise InputError("Euler angles need a sequence.", 'Give sequence, such as "ZXZ" or "ZYX".')
     require_system(about)
     trajectory = of_observed_arrays(body, raw_start(state), said, instants, arrays, form, names, flag)
     return scored(trajectory, needed)
@@ -346,9 +346,9 @@ def drift(run: Trajectory) -> Drifts:
         (1.3) of the paper, and the integrals of the classical cases.
     """
     if not isinstance(run, Trajectory):
-        raise InputError(f"run = {quoted(run)} is not a Trajectory.", "Give what heavytop.propagate returned.")
+        raise InputError(f"run must be a Trajectory; got {quoted(run)}.", "Give the result of heavytop.propagate.")
     if len(run.states) != len(run.times):
-        raise InputError("The states of this run went to its observer.", "Propagate without an observer.")
+        raise InputError("The states of this run were passed to its observer.", "Propagate without an observer.")
     computed = run.principal or run
     measure = Drift(run.problem, run.problem.integrals())
     carried = computed.attitude is not None

@@ -32,15 +32,17 @@ _STATE_SECONDS = 1e-3
 def score(
     trajectories: Annotated[
         list[Path],
-        typer.Argument(metavar="TRAJECTORY...", help="Files of trajectories (`heavytop docs score`); - reads one."),
+        typer.Argument(metavar="TRAJECTORY...", help="Trajectory files (`heavytop docs score`); - is standard input."),
     ],
-    case: Annotated[str | None, typer.Option(help="Built-in case of its top and start.", autocompletion=cases)] = None,
+    case: Annotated[
+        str | None, typer.Option(help="Built-in case that gives top and start.", autocompletion=cases)
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="New folder for a report with its row.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a page about it to that file.")] = None,
-    require: Annotated[str | None, typer.Option(help="Exit 1 where fewer digits are right: 9.5.")] = None,
+    require: Annotated[str | None, typer.Option(help="Exit 1 if fewer digits are right, such as 9.5.")] = None,
     normalize: Annotated[
         bool,
-        typer.Option("--normalize", help="Take quaternions, matrices and gamma of any length."),
+        typer.Option("--normalize", help="Normalize quaternions, matrices and gamma."),
     ] = False,
     json: Json = False,
 ) -> int:
@@ -97,9 +99,9 @@ def _several(
     from heavytop.features.score.several import exit_code, orders, score_files, text
 
     if page is not None:
-        raise InputError(f"--out and --html are of one trajectory; got {len(paths)}.", "Score them one by one.")
+        raise InputError(f"--out and --html need a single trajectory; got {len(paths)}.", "Score each separately.")
     if Path("-") in paths:
-        raise InputError("Standard input is one trajectory.", "Give files.")
+        raise InputError("Standard input must be the only trajectory.", "Give files.")
     files = score_files(paths, case, require, normalize)
     if json:
         print_json({"files": [file.document for file in files], "orders": [asdict(order) for order in orders(files)]})

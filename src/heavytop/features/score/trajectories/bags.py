@@ -48,7 +48,7 @@ def of_bag(path: Path) -> str:
     if len(topics_with_rows) != 1:
         names = ", ".join(topics_with_rows) or "none of " + (", ".join(topics) or "no topics")
         raise InputError(
-            f"Attitudes or angular velocities are in {len(topics_with_rows)} topics: {names}.",
+            f"{len(topics_with_rows)} topics contain attitudes or angular velocities: {names}.",
             "Give a bag with one: rosbags-convert --src FILE --dst FILE.mcap --include-topic NAME.",
         )
     return "\n".join([*comments, *topics_with_rows.popitem()[1]])

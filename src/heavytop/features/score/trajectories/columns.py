@@ -20,7 +20,7 @@ from heavytop.features.score.trajectories.observed import RawStart
 from heavytop.measure.attitude_error import FRAMES, WIDTHS, Convention
 from heavytop.precision import Vector, dot, exact, log10, vector
 
-REMEDY = "`heavytop docs score` lists the columns that are understood."
+REMEDY = "`heavytop docs score` lists the column names."
 _UNIT = re.compile(r"(?:(deg(?:rees?)?|°)|rad(?:ians?)?)\s*[\])]?$", re.IGNORECASE)
 _INDEXED = re.compile(r"(.*[^\W\d_])((?:[\[(]\s*[0-4wxyz]\s*(?:,\s*[0-4wxyz]\s*)?[\])])+)(?:\s.*)?", re.IGNORECASE)
 _PATTERNS = tuple(
@@ -117,11 +117,13 @@ class Header:
         for quantity, name in (("omega", "omega"), ("framed", "omega"), ("gamma", "gamma")):
             components = self.places.get(quantity, {})
             if {"0", "3"} <= set(components):
-                raise InputError(f"There are {name}0 and {name}3.", "Number them from 1 to 3, or from 0 to 2.")
+                raise InputError(
+                    f"The header has both {name}0 and {name}3.", "Number them from 1 to 3, or from 0 to 2."
+                )
             for component, index in components.items():
                 axis = _AXES.get(component) or str(int(component) + ("0" in components))
                 if indices.setdefault(f"{name}{axis}", index) != index:
-                    raise InputError(f"The column {name}{axis} stands twice.", "Give each column once.")
+                    raise InputError(f"The column {name}{axis} occurs twice.", "Give each column once.")
         return indices
 
 
@@ -141,7 +143,7 @@ def header(names: Sequence[str], joint: str = "") -> Header:
             continue
         if plain in _TIME:
             if time is not None:
-                raise InputError("The column t stands twice.", "Give each column once.")
+                raise InputError("The column t occurs twice.", "Give each column once.")
             time = index
             units["t"] = {_unit("t", name)}
             continue
@@ -153,13 +155,13 @@ def header(names: Sequence[str], joint: str = "") -> Header:
         if component in indices.setdefault(quantity, {}):
             of_state = quantity in ("omega", "gamma")
             label = f"{quantity}{_AXES.get(component, component)}" if of_state else quoted(name)
-            raise InputError(f"The column {label} stands twice.", "Give each column once.")
+            raise InputError(f"The column {label} occurs twice.", "Give each column once.")
         indices[quantity][component] = index
         units.setdefault(quantity, set()).add(_unit(quantity, name))
         if quantity == "euler" and (unit := _UNIT.search(name.strip())):
             angles.add("degrees" if unit[1] else "radians")
     if len(angles) > 1:
-        raise InputError("The header has angles in degrees and in radians.", "Give all of them in one unit.")
+        raise InputError("The header has angles in degrees and in radians.", "Use one unit for all angles.")
     if together:
         indices["quaternion"] = together
     for name in others:
@@ -180,7 +182,7 @@ def _quaternion(names: Sequence[str], plain: Sequence[str]) -> dict[str, int]:
     matches = [(begin, run) for begin, run in runs if run in _TOGETHER and not any(lengths[begin : begin + 4])]
     if len(matches) > 1:
         raise InputError(
-            f"Of the columns {quoted(','.join(names))[:80]} more than four may be a quaternion.",
+            f"Of the columns {quoted(','.join(names))[:80]} more than four may belong to a quaternion.",
             "Call them qw,qx,qy,qz, and positions px,py,pz.",
         )
     return {name[-1]: begin + number for begin, run in matches for number, name in enumerate(run)}
@@ -199,7 +201,7 @@ def _require_no_quantity(name: str, indices: Mapping[str, object]) -> None:
         named = quantity[0] in (*_OMEGA, "gamma") or (quantity[0] and "_" not in parts[end])
         if named and not {quantity[0], *(_OMEGA if quantity[0] in _OMEGA else ())} & indices.keys():
             raise InputError(
-                f"The column {quoted(name)} begins like one of the {_words(quantity[0])}, and is not understood.",
+                f"The column {quoted(name)} looks like one of {_words(quantity[0])}, but its name is not known.",
                 f"Write a unit in brackets, {quoted(begun + ' [unit]')}, or give the column another name.",
             )
 
@@ -218,7 +220,7 @@ def _in_one_unit(units: Mapping[str, set[Unit]]) -> dict[str, Unit]:
     for quantity, of_quantity in units.items():
         if len({(unit.size, unit.turning) for unit in of_quantity}) > 1:
             names = " and ".join(sorted(f"in {unit.name}" if unit.name else "without a unit" for unit in of_quantity))
-            raise InputError(f"The header has the {_words(quantity)} {names}.", "Give all of it in one unit.")
+            raise InputError(f"The units of {_words(quantity)} differ: {names}.", "Use one unit.")
     unit_of_quantity = {
         quantity: min(of_quantity, key=lambda unit: unit.name) for quantity, of_quantity in units.items()
     }
@@ -272,8 +274,8 @@ def ordered_places(
     missing = [name for name in names if name not in components]
     extra = [name for name in components if name not in names]
     if missing or extra:
-        fault = f"component {missing[0]} is missing" if missing else f"component {extra[0]} belongs to no other"
-        raise InputError(f"The columns of the {_words(quantity)} are not complete: {fault}.", REMEDY)
+        fault = f"component {missing[0]} is missing" if missing else f"component {extra[0]} has no counterpart"
+        raise InputError(f"The columns of the {_words(quantity)} are incomplete: {fault}.", REMEDY)
     return [(name, components[name]) for name in names]
 
 
@@ -310,7 +312,7 @@ def _words(quantity: str) -> str:
 def cell(text: str, where: str) -> Fraction | None:
     """An exact number; None for NaN and infinities; InputError that names the place for everything else."""
     if not text.strip():
-        raise InputError(f"{where} is empty.", "Give every row all of its columns.")
+        raise InputError(f"{where} is empty.", "Give every row all columns.")
     return written_numbers.number(text, where)
 
 
@@ -335,7 +337,7 @@ _ARRAYS = {
 }
 """Keys of JSON documents whose values are a list for each time."""
 KEYS = {*CONVENTIONS, *STARTS, *BODIES, *_ARRAYS}
-_REMEDY = "`heavytop docs score` shows what a file may hold."
+_REMEDY = "`heavytop docs score` describes the file formats."
 _ORDERS = {
     **dict.fromkeys(("wxyz", "scalar first", "scalar_first"), "wxyz"),
     **dict.fromkeys(("xyzw", "scalar last", "scalar_last"), "xyzw"),
@@ -365,7 +367,7 @@ def convention(document: Mapping[str, Any], header: Header | None = None) -> Con
     stated: dict[str, Any] = {}
     if (order := _word(document, "quaternion_order")) is not None:
         if order.lower() not in _ORDERS:
-            raise InputError(f"quaternion_order = {quoted(order)} is not known.", "Use wxyz or xyzw.")
+            raise InputError(f"quaternion_order must be wxyz or xyzw; got {quoted(order)}.", "Give one of these.")
         stated["quaternion_order"] = _ORDERS[order.lower()]
     for key in ("quaternion", "matrix"):
         if _is_direction(document.get(key)):
@@ -375,7 +377,7 @@ def convention(document: Mapping[str, Any], header: Header | None = None) -> Con
             stated[key] = word.upper() if key == "sequence" else word.lower().lstrip("+")
     if header is not None and header.angles and stated.setdefault("angles", header.angles) != header.angles:
         raise InputError(
-            f"The header says {header.angles} and angles = {stated['angles']}.", "Say the unit of angles once."
+            f"The header declares {header.angles}, but angles = {stated['angles']}.", "Give the unit of angles once."
         )
     for key in ("pivot", "point"):
         if document.get(key) is not None:
@@ -391,7 +393,7 @@ def _is_direction(value: object) -> bool:
 def _word(document: Mapping[str, Any], key: str) -> str | None:
     value = document.get(key)
     if value is not None and not isinstance(value, str):
-        raise InputError(f"{key} = {quoted(value)} is not a word.", _REMEDY)
+        raise InputError(f"{key} must be a word; got {quoted(value)}.", _REMEDY)
     return None if value is None else value.strip()
 
 
@@ -399,7 +401,7 @@ def in_space(document: Mapping[str, Any]) -> bool:
     """Whether columns wx, wy, wz, or Ω without other columns of it, are in the axes of space."""
     frame = (_word(document, "frame") or "body").lower()
     if frame not in FRAMES:
-        raise InputError(f"frame = {quoted(frame)} is not known.", "Use space or body.")
+        raise InputError(f"frame must be space or body; got {quoted(frame)}.", "Give one of these.")
     return frame == "space"
 
 
@@ -428,11 +430,9 @@ def columns(document: Mapping[str, Any], convention: Convention) -> ColumnTable:
     """
     table = _of_table(document, convention) if "header" in document else _of_lists(document, convention)
     if not table.values:
-        raise InputError("There are no columns that fix something of the motion.", _REMEDY)
+        raise InputError("No column describes the motion.", _REMEDY)
     if "euler" in table.values and not convention.sequence:
-        raise InputError(
-            "There are Euler angles, and nothing says of which sequence.", 'Give sequence, such as "ZXZ" or "ZYX".'
-        )
+        raise InputError("The Euler angles have no sequence.", 'Give sequence, such as "ZXZ" or "ZYX".')
     return table
 
 
@@ -456,7 +456,7 @@ def _of_table(document: Mapping[str, Any], convention: Convention) -> ColumnTabl
         if quantity == "framed" or (quantity == "omega" and "framed" not in header.places):
             name = "omega_space" if space else "omega"
         if name in places:
-            raise InputError(f"The columns of {name} stand twice.", "Give each quantity once, and say its frame.")
+            raise InputError(f"The columns of {name} occur twice.", "Give each quantity once, with its frame.")
         places[name] = ordered
         if quantity in header.units and quantity != "position":  # of which the body decides
             units[name] = header.units[quantity]
@@ -543,9 +543,9 @@ def _of_lists(document: Mapping[str, Any], convention: Convention) -> ColumnTabl
 def cell_of(value: Any, where: str) -> Fraction | None:
     """The exact number of a value of JSON, as :func:`cell`."""
     if value is None:
-        raise InputError(f"{where} has an empty place.", "Give every row all of its columns.")
+        raise InputError(f"{where} has an empty cell.", "Give every row all columns.")
     if not isinstance(value, str):
-        raise InputError(f"{where} holds a {type(value).__name__}, not a number.", _REMEDY)
+        raise InputError(f"{where} must contain numbers; got a {type(value).__name__}.", _REMEDY)
     return cell(value, where)
 
 
@@ -562,7 +562,7 @@ def _flat(row: Any, width: int, what: str) -> list[Any]:
         row = [value for part in row for value in part]
     if not isinstance(row, list) or len(row) != width:
         has = f"{len(row)} numbers" if isinstance(row, list) else "no list"
-        raise InputError(f"{what} has {has}, not {width}.", "Give every row all of its columns.")
+        raise InputError(f"{what} has {has}, not {width}.", "Give every row all columns.")
     return row
 
 
@@ -596,9 +596,8 @@ def start(
                 return RawStart("quaternion", (Fraction(1), Fraction(0), Fraction(0), Fraction(0)), omega, space)
         if known is None:
             raise InputError(
-                "The attitude at t = 0 is missing: neither gamma nor start_quaternion, start_matrix or start_euler, "
-                "and no row t = 0 gives it.",
-                "Give one of them, or the row t = 0, or --case NAME.",
+                "The attitude at t = 0 is missing.",
+                "Give gamma, start_quaternion, start_matrix or start_euler, or the row t = 0, or --case NAME.",
             )
         from_row, form, values = True, known, list(first[known] or ())
     elif forms:
@@ -606,7 +605,7 @@ def start(
     else:
         form, values = "gamma", _numbers(gamma, "gamma", 3)
     if form == "euler" and not convention.sequence:
-        raise InputError("start_euler needs its sequence.", 'Give sequence, such as "ZXZ".')
+        raise InputError("start_euler needs a sequence.", 'Give sequence, such as "ZXZ".')
     beside = _numbers(gamma, "gamma", 3) if forms and gamma is not None else None
     omega, space = _omega(document, first)
     return RawStart(
@@ -628,7 +627,7 @@ def _omega(document: Mapping[str, Any], first: Mapping[str, tuple[Fraction, ...]
             return vector(list(first[name] or ()), name), name == "omega_space"
     plural = " (omegas are the columns of JSON)" if "omegas" in document else ""
     raise InputError(
-        "The key omega is missing, and no row t = 0 gives it.",
+        "The key omega is missing, and there is no row t = 0.",
         f"Give omega (in body axes) or omega_space at t = 0{plural}, or the row t = 0, or --case NAME.",
     )
 
@@ -640,7 +639,7 @@ def _attitude(value: object, name: str, key: str, convention: Convention) -> tup
     values = _flat(value, WIDTHS[name], key)
     marked = [isinstance(value, str) and value.strip().endswith("deg") for value in values]
     if any(marked) and (name != "euler" or not all(marked)):
-        raise InputError(f"{key} = {quoted(value)} mixes units.", "Give every angle as 30deg, or none.")
+        raise InputError(f"{key} = {quoted(value)} mixes units.", "Give deg with every angle, or with none.")
     with prefixed(key):
         part = [exact(value.strip().removesuffix("deg") if isinstance(value, str) else value) for value in values]
     return part, name == "euler" and (any(marked) or convention.angles == "degrees")

@@ -44,7 +44,7 @@ from heavytop.top.heavy_top import HeavyTop, State, check_times, require_physica
 # Text tables of other programs: separators, header, comments.
 
 
-REMEDY = "`heavytop docs score` shows both forms of the file, `heavytop list --case lagrange` one to paste."
+REMEDY = "`heavytop docs score` describes both file formats; `heavytop list --case lagrange` prints an example."
 COLUMNS = ("t", *VARIABLES)
 VECTORS = ("inertia", "centre", "omega", "gamma", "rotor")
 LISTS = (*VECTORS, "omega_space", "pivot", "point", "start_quaternion", "start_matrix", "start_euler")
@@ -77,7 +77,7 @@ def read_table(text: str, started: bool = False) -> tuple[dict[str, Any], list[s
     Raises InputError for a header or a row that cannot be understood, for a misspelt key and one that stands twice.
     """
     if "\0" in text:
-        raise InputError("A table must be text; this holds a byte 0.", REMEDY)
+        raise InputError("A table must be text; got a zero byte.", REMEDY)
     if text.count("\n") > 2 * MOST_STATES:
         raise too_many(text.count("\n"), "lines")
     keys, comments, lines, body = _lines(text)
@@ -90,7 +90,7 @@ def read_table(text: str, started: bool = False) -> tuple[dict[str, Any], list[s
         header, body, lines = first, body[1:], lines[1:]
     names, notes = _without_header(first) if header is None else (header, [])
     if not body:
-        raise InputError("The table has no row below its header.", "Give a row for each time.")
+        raise InputError("The table has no rows below its header.", "Give a row for each time.")
     cells = _split(body, lines, separator, len(names))
     names, cells, noted = logs.with_one_time(names, cells, started or not keys.keys().isdisjoint(_STARTS))
     notes += noted
@@ -105,9 +105,9 @@ def read_table(text: str, started: bool = False) -> tuple[dict[str, Any], list[s
         notes += noted
     units = {"omega" if name == "framed" else name: unit.name for name, unit in meaning.units.items()}
     in_units = [f"{name} is in {unit}" for name, unit in units.items() if name != "position"]
-    notes += [f"as the header says, {', '.join(in_units)}"] if in_units else []
+    notes += [f"as the header declares, {', '.join(in_units)}"] if in_units else []
     if meaning.unknown:
-        notes.append(f"units of the header are not known, and were not converted: {', '.join(sorted(meaning.unknown))}")
+        notes.append(f"unknown units in the header, not converted: {', '.join(sorted(meaning.unknown))}")
     columns: dict[str, Any]
     if meaning.time is not None and (meaning.units or observed_columns.is_more_than_states(meaning)):
         unused = [*meaning.others, *(names[place] for place in _parts(meaning))]
@@ -156,7 +156,7 @@ def _take_key(comment: str, keys: dict[str, str | list[str]]) -> bool:
             raise unknown(key, known)
         return False
     if key in keys:
-        raise InputError(f"The key {key} stands twice.", "Give each key once.")
+        raise InputError(f"The key {key} occurs twice.", "Give each key once.")
     keys[key] = _numbers(key, value.strip("[]() ")) if key in LISTS else value
     return True
 
@@ -165,11 +165,11 @@ def _without_header(first: Sequence[str]) -> tuple[Sequence[str], list[str]]:
     """The columns of a table that does not name them, by its first row, and the note that says so."""
     width = len(first)
     if text := next((text for text in first if not _is_number(text)), None):
-        raise InputError(f"There is no header, and {quoted(text)} of the first row is not a number.", logs.NAMES)
+        raise InputError(f"The first row must be a header or numbers; got {quoted(text)}.", logs.NAMES)
     if width == len(logs.KITTI):
         raise InputError(
-            "Rows of 12 numbers without times, as KITTI has them: the first three rows of [R p; 0 1].",
-            f"Put the time before each row, and above the first the line t {' '.join(logs.KITTI)}.",
+            "The rows have 12 numbers and no times, as in KITTI: the first three rows of [R p; 0 1].",
+            f"Put the time before each row, and above the first row t {' '.join(logs.KITTI)}.",
         )
     names = logs.TUM if width == len(logs.TUM) and logs.is_unit(first[-4:]) else COLUMNS
     if width != len(names):
@@ -177,7 +177,7 @@ def _without_header(first: Sequence[str]) -> tuple[Sequence[str], list[str]]:
             f"The header is not {','.join(COLUMNS)}: without a header Row 1 has {width} columns, not {len(COLUMNS)}.",
             "Give a header that names the columns.",
         )
-    return names, [f"without a header the columns are taken as {' '.join(names)}"]
+    return names, [f"columns without a header, read as {' '.join(names)}"]
 
 
 def _numbers(key: str, text: str) -> list[str]:
@@ -203,12 +203,12 @@ def unread(names: Sequence[str], header: Sequence[str]) -> list[str]:
     columns = {name.strip() for name in header}
     own = {"xi1", "xi2", "xi3"} | {f"{name}_radius" for name in columns}
     more = [name for name in names if name.strip() not in own]
-    return [f"columns that are not read: {', '.join(name[:40] for name in more[:6])}"] if more else []
+    return [f"ignored columns: {', '.join(name[:40] for name in more[:6])}"] if more else []
 
 
 def _no_header(missing: list[str], names: Sequence[str] = ()) -> InputError:
     among = f" among {', '.join(name[:20] for name in names[:9])}" if names else ""
-    said = f": {', '.join(missing)} not found{among}" if missing else ": the file has no line but comments"
+    said = f": {', '.join(missing)} not found{among}" if missing else ": the file has only comments"
     return InputError(f"The header is not {','.join(COLUMNS)}{said}.", f"{logs.NAMES} {REMEDY}")
 
 
@@ -249,7 +249,7 @@ def _split(body: list[str], lines: list[int], separator: str | None, width: int)
         cells = _cells(line.replace(",", ".") if spaced else line, separator)
         if len(cells) != width:
             decimal_commas = separator == "," and len(cells) == 2 * width
-            remedy = "Are these decimal commas? Separate the columns by semicolons." if decimal_commas else _ALL_COLUMNS
+            remedy = "For decimal commas, separate the columns by semicolons." if decimal_commas else _ALL_COLUMNS
             raise InputError(f"Line {number} has {len(cells)} columns, not {width}.", remedy)
         # where a semicolon, a tab or a space separates, a comma is the point of a decimal
         rows.append([cell.replace(",", ".") for cell in cells] if separator in (";", "\t") else cells)
@@ -310,8 +310,8 @@ def _require_alike(case: Case, names: Sequence[str], given: Sequence[Fraction], 
 
 def _other(case: Case, what: str, new: str, old: str) -> InputError:
     return InputError(
-        f"The file says {what} = {new}, but in the case {case.name} it is {old}.",
-        f"`heavytop list --case {case.name}` shows the data; without a case the file is scored by its own.",
+        f"The file has {what} = {new}, but the case {case.name} has {old}.",
+        f"`heavytop list --case {case.name}` shows the data. Without a case the file is scored with its own data.",
     )
 
 
@@ -366,7 +366,7 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
         path = next(path.glob("report.json"), None) or bags.storage(path)
     piped = str(path) == "-"
     if not piped and path.exists() and not path.is_dir() and path.suffix.lower() not in _SUFFIXES:
-        raise InputError(f"{shown_path} has none of the endings {', '.join(_SUFFIXES)}.", REMEDY)
+        raise InputError(f"{shown_path} must end in one of {', '.join(_SUFFIXES)}.", REMEDY)
     with readable(f"The trajectory {shown_path}", REMEDY):
         content = sys.stdin.buffer.read() if piped else read_whole(path)
         text = _text_of(path, content)
@@ -409,7 +409,7 @@ def _json(text: str) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise InputError(f"This is not JSON: {error}.", REMEDY) from None
     if not isinstance(document, dict):
-        raise InputError("The document is not an object.", REMEDY)
+        raise InputError("The JSON document must be an object.", REMEDY)
     for key in sorted(document.keys() - _KEYS - _NOT_READ):
         raise unknown(key, sorted(_KEYS))
     return document
@@ -455,7 +455,7 @@ def _observed(document: dict[str, Any], stem: str, case: Case | None, normalize:
     notes: tuple[str, ...] = ()
     if not body.weight and not any(body.centre) and {"position"} < set(table.values):
         table = replace(table, values={name: rows for name, rows in table.values.items() if name != "position"})
-        notes = ("positions of a free body are left out: they do not follow from its rotation",)
+        notes = ("positions of a free body are ignored: its rotation does not determine them",)
     which = system_of(_system(document, case), body)
     require_system(which)
     if case is not None and isinstance(body, HeavyTop):
@@ -484,7 +484,7 @@ def _times(document: dict[str, Any]) -> list[Fraction]:
         texts = [written_numbers.finite(time, f"{row}, t") for time, row in rows]
     times = list(check_times(texts))
     if not any(times):
-        raise InputError("The only time is 0, where the state is the start.", "Give states at later times.")
+        raise InputError("No time other than 0 was given.", "Give states at later times.")
     return times
 
 
@@ -517,7 +517,7 @@ def _body(document: dict[str, Any], case: Case | None) -> AnyBody:
     if not keys:
         return _top(document, case)
     if "weight" in document:
-        raise InputError(f"weight and {keys[0]} are both given.", "Give the weight, or mass and gravity.")
+        raise InputError(f"weight and {keys[0]} were given.", "Give the weight, or mass and gravity.")
     mass, gravity, about = (_text(document, key, "") for key in ("mass", "gravity", "about"))
     for key, value in (("mass", mass), ("gravity", gravity)):
         if not value:
@@ -550,7 +550,7 @@ def _start(document: dict[str, Any], case: Case | None, at_start: State | None) 
     if case is None and not {"omega", "gamma"} <= document.keys():
         missing = "omega" if "omega" not in document else "gamma"
         raise InputError(
-            f"The key {missing} is missing, and no row t = 0 gives the start.",
+            f"The key {missing} is missing, and there is no row t = 0.",
             "Give omega and gamma at t = 0, or the row t = 0, or --case NAME.",
         )
     return State(*(_vector(document, key, case) for key in ("omega", "gamma")))
@@ -575,14 +575,14 @@ def _text(document: dict[str, Any], key: str, default: str | None = None) -> str
     if value is None:
         raise InputError(f"The key {key} is {'null' if key in document else 'missing'}.", REMEDY)
     if not isinstance(value, str):
-        raise InputError(f"{key} is a {type(value).__name__}.", "Give text or a number.")
+        raise InputError(f"{key} must be text or a number; got a {type(value).__name__}.", "Give one of these.")
     return value
 
 
 def _integer(value: object, what: str) -> int:
     number = written_numbers.finite(value, what)
     if number < 0 or number.denominator != 1 or number >= 1 << 63:
-        raise InputError(f"{what} = {shown(number)} is not a count.", "Give an integer from 0 to 2^63 - 1.")
+        raise InputError(f"{what} must be an integer from 0 to 2^63 - 1; got {shown(number)}.", "Correct the count.")
     return int(number)
 
 
@@ -592,9 +592,7 @@ def _precision(document: dict[str, Any], texts: list[str]) -> Precision:
         precision = parse(_text(document, "precision"))
         bits = _integer(document["bits"], "bits") if "bits" in document else precision.bits
         if bits != precision.bits:
-            raise InputError(
-                f"bits = {bits}, but {precision.name} has {precision.bits}.", "Give either of precision and bits."
-            )
+            raise InputError(f"bits = {bits}, but {precision.name} has {precision.bits}.", "Give precision or bits.")
         return precision
     if "bits" in document:
         bits = _integer(document["bits"], "bits")

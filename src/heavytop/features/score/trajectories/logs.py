@@ -99,16 +99,16 @@ def require_understood(names: Sequence[str], others: Sequence[str], quantities: 
     missing = [what for what, given in _GIVES.items() if not set(given) & set(quantities)]
     if "an attitude" in missing and {"rx", "ry", "rz"} <= {name.strip().lower() for name in names}:
         raise InputError(
-            "The columns rx, ry, rz may be a rotation vector, angles, or a position.",
+            "The columns rx, ry, rz are ambiguous: a rotation vector, angles, or a position.",
             "Add the line `# attitude: rotation vector` above the columns, or call a position px, py, pz.",
         )
     for name in others:
         looks = next((what for what in missing if _LOOKS[what].search(name)), None)
         if looks and not _OTHER.match(name):
-            raise InputError(f"The column {quoted(name)} looks like {looks}, and is not understood.", NAMES)
+            raise InputError(f"The column {quoted(name)} looks like {looks}, but its name is not known.", NAMES)
         if len(missing) == len(_GIVES) and _INDEX.fullmatch(name):
             raise InputError(
-                f"The column {quoted(name)} is of a joint that is not said.",
+                f"The joint of the column {quoted(name)} is not declared.",
                 "Add the line `# joint: free` or `# joint: ball` above the columns.",
             )
 
@@ -154,7 +154,7 @@ def with_one_time(
         names[index] += next((f" [{unit}]" for least, unit in _EPOCH_UNITS if first >= least), "")
     second = number(cells[1][index]) if len(cells) > 1 else None
     if names[index] == "t" and second and second - first >= _LONG and first.denominator == second.denominator == 1:
-        apart = f"The first {plain[index]}s are integers {decimal_text(second - first, 12)} apart, without a unit."
+        apart = f"The column {plain[index]} has integers {decimal_text(second - first, 12)} apart, and no unit."
         raise InputError(apart, f"Name the column {plain[index]} [us], [ms] or [ns], or [s] for seconds.")
     unit = names[index][1:].strip(" []()")
     if first == 0 or (started and abs(first) < _TEN_DAYS * _PER_SECOND.get(unit, 1)):
@@ -210,15 +210,15 @@ def without_repeats(
         if kept and time == times[kept[-1]]:
             if not all(map(_agree, rows[index], rows[kept[-1]])):
                 raise InputError(
-                    f"Lines {lines[kept[-1]]} and {lines[index]} are of one time and differ.",
-                    "Keep one of them; at an impact, the state before it or the one after.",
+                    f"Lines {lines[kept[-1]]} and {lines[index]} have the same time and differ.",
+                    "Keep one of them; at an impact, the state before or after it.",
                 )
             repeated += 1
             kept[-1] = max(kept[-1], index, key=lambda row: sum(map(len, rows[row])))  # more digits
             continue
         if len(kept) > 1 and (time - times[kept[-1]]) * (times[kept[1]] - times[kept[0]]) < 0:
             cut = f"the time goes back at line {lines[index]}"
-            return kept, [*_repeats(repeated), f"{cut}: what came before is scored, {len(kept)} rows"], cut
+            return kept, [*_repeats(repeated), f"{cut}: the {len(kept)} rows before it are scored"], cut
         kept.append(index)
     return kept, _repeats(repeated), ""
 
@@ -256,7 +256,7 @@ def with_quaternion(names: Sequence[str]) -> list[str]:
 
 
 def _repeats(count: int) -> list[str]:
-    return [f"rows that repeat the one before are left out: {count}"] if count else []
+    return [f"ignored repetitions of the row before: {count}"] if count else []
 
 
 def of_rodrigues(s: Sequence[Fraction]) -> tuple[Fraction, ...]:
@@ -295,7 +295,9 @@ def of_ephemeris(text: str) -> str:
     meta = dict(re.findall(r"^\s*([A-Z_]+)\s*=\s*(.*?)\s*$", text, re.MULTILINE))
     kind = meta.get("ATTITUDE_TYPE", "").upper()
     if kind not in _KINDS:
-        raise InputError(f"ATTITUDE_TYPE = {quoted(kind)} is not read.", f"Write it with one of {', '.join(_KINDS)}.")
+        raise InputError(
+            f"ATTITUDE_TYPE = {quoted(kind)} is not supported.", f"Write it with one of {', '.join(_KINDS)}."
+        )
     first = meta.get("QUATERNION_TYPE", "LAST").upper() == "FIRST"
     order = ["qw", "qx", "qy", "qz"] if first else ["qx", "qy", "qz", "qw"]
     of_spacecraft = {letter: bool(_SPACECRAFT.match(meta.get(f"REF_FRAME_{letter}", ""))) for letter in "AB"}

@@ -212,8 +212,8 @@ def require_matrix(rows: Sequence[Sequence[Fraction]], slack: Fraction, what: st
         )
     if abs(off) > 2 * slack:
         raise InputError(
-            f"{what} is not orthogonal: R R^T is off the unit matrix by {six_digits(off)}.",
-            "Write all its digits, or use --normalize (normalize=True in Python), which takes the rotation next to it.",
+            f"{what} is not orthogonal: R R^T differs from the identity by {six_digits(off)}.",
+            "Write all its digits, or use --normalize (normalize=True in Python), which takes the nearest rotation.",
         )
 
 
@@ -283,7 +283,7 @@ class GivenTrajectory:
         for time, state in zip(self.times, self.states, strict=True):
             if state is not None and abs(off := dot(state[3:], state[3:]) - 1) > _ODD_GAMMA:
                 sentences.append(
-                    f"|gamma|^2 is off 1 by {decimal_text(off, 3)} at t = {shown(time)}: "
+                    f"|gamma|^2 differs from 1 by {decimal_text(off, 3)} at t = {shown(time)}: "
                     f"are the states in the order {' '.join(VARIABLES)}?"
                 )
                 break
@@ -330,7 +330,7 @@ def named(text: str, what: str) -> str:
     """The text; raises InputError for one that is empty, too long or cannot be shown."""
     if not 0 < len(text) <= LONGEST_NAME or not text.isprintable():
         raise InputError(
-            f"The {what} of {len(text)} characters begins {text[:40]!r}.",
+            f"The {what} has {len(text)} characters; it begins {text[:40]!r}.",
             f"Use 1 to {LONGEST_NAME} printable characters.",
         )
     return text
