@@ -112,7 +112,7 @@ def test_a_state_off_the_unit_sphere_is_refused_by_name(gamma, size):
         (f"{AREA} + sqrt(1/2 - {G})", {}, "it is -1/2 where |gamma| = 1"),
         (f"log({G} - 1) + {AREA}", {}, "it is 0 where |gamma| = 1"),
         (f"asin({G} + 1/7)", {}, "where |gamma| = 1"),
-        (f"{ENERGY}/(sqrt({G}) - 1)", {}, "at no sample"),
+        (f"{ENERGY}/(sqrt({G}) - 1)", {}, "at every sample"),
         # relations that no body meets
         (f"{G} - 4", {"kind": "relation"}, "exclude each other within |gamma| = 1"),
         ("1", {"where": [f"{G} - 4"]}, "exclude each other within |gamma| = 1"),
@@ -184,7 +184,7 @@ def test_a_claim_about_one_top_is_judged_about_that_top():
 def test_assumptions_and_relations_that_contradict_each_other_prove_nothing(assume, relations):
     for sample in ("2", "1", "-1"):
         parameters = {"a": sample, "b": "1"}
-        with pytest.raises(InputError, match=r"breaks the (assumption|relation)"):
+        with pytest.raises(InputError, match=r"violates the (assumption|relation)"):
             audited(integral("Omega1", assume=assume, relations=relations, parameters=parameters))
 
 
@@ -210,7 +210,7 @@ def test_a_moment_that_is_not_positive_is_told_with_its_value_and_what_cures_it(
 @pytest.mark.parametrize("name", ["t", "Omega2", "gamma1", "pi", "sin", "atan2"])
 @pytest.mark.parametrize("table", ["parameters", "definitions"])
 def test_a_name_that_is_taken_is_refused(name, table):
-    with pytest.raises(InputError, match="is taken"):
+    with pytest.raises(InputError, match="is reserved"):
         audited(integral("Omega1") | {table: {name: "1"}})
 
 

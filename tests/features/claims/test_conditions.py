@@ -71,7 +71,7 @@ ON_AXIS_1 = "0 1 2 1 0 0"
         ("Omega1^2 + 1", "relation", "no sample lies on the relations"),
         ("sqrt(Omega1^2)/Omega1", "integral", "Omega1 ≠ 0"),
         ("sqrt(Omega1) - sqrt(Omega1) + gamma1^2 + gamma2^2 + gamma3^2", "integral", "Omega1 ≥ 0"),
-        ("acos(2 + gamma1^2 + gamma2^2 + gamma3^2)", "integral", "at no sample"),
+        ("acos(2 + gamma1^2 + gamma2^2 + gamma3^2)", "integral", "at every sample"),
     ],
 )
 def test_what_needs_a_condition_that_is_not_shown_and_a_set_without_points_are_undecided(value, kind, named):
@@ -152,11 +152,11 @@ def test_a_state_off_its_condition_by_1e_200_refutes_nothing():
     assert audited(integral("Omega3", FREE, ["Omega1", "Omega2"], [on, off])).verdict == "holds"
     report = audited(integral("Omega3", FREE, ["Omega1", "Omega2"], [off]))
     assert report.verdict == "undecided"
-    assert "e-200, Omega1 is not 0" in open_conditions(report)
+    assert "1e-200, Omega1 is not 0" in open_conditions(report)
 
 
 def test_a_parameter_off_a_relation_by_1e_400_is_refused():
-    with pytest.raises(InputError, match="breaks the relation"):
+    with pytest.raises(InputError, match="violates the relation"):
         audited(upright("1 + t*(a - 1)", relations=["a - 1"], parameters={"a": "1." + "0" * 399 + "1"}))
 
 
@@ -304,7 +304,7 @@ def test_a_zero_of_a_divisor_is_removable_on_each_half_of_the_time(domain: str) 
 
 def test_messages_write_formulas_as_files_do() -> None:
     for assumed, relations in ((["g^2 > sqrt(g^2)^3"], []), ([], ["g^2 - 3"])):
-        with pytest.raises(InputError, match=r"breaks the (assumption|relation) g\^2 ") as error:
+        with pytest.raises(InputError, match=r"violates the (assumption|relation) g\^2 ") as error:
             _verdict("Omega1", assumed, relations=relations, parameters={"g": ["1"]})
         assert "**" not in str(error.value)
         assert "Abs" not in str(error.value)
@@ -317,7 +317,7 @@ def test_what_is_assumed_to_be_unequal_is_of_no_sign() -> None:
     value = "Omega1*(sqrt(g^2) - g)"
     assert _verdict(value, ["g != 0"], parameters={"g": ["1", "2"]}) == ("undecided", {"g > 0": "holds"})
     for text in ("g != 1", "g != g", "2 != 2"):
-        with pytest.raises(InputError, match=f"breaks the assumption {text}"):
+        with pytest.raises(InputError, match=f"violates the assumption {text}"):
             _verdict(value, [text], parameters={"g": ["1"]})
     for text in ("g !=", "!= 0", "g != 0 != 1", "g ! 0", "g != 0 > 1"):
         with pytest.raises(InputError):

@@ -97,7 +97,7 @@ def test_an_entry_is_audited_by_its_id_and_its_other_names(folder: Path) -> None
 @pytest.mark.parametrize(
     ("change", "code", "said"),
     [
-        ({}, 0, "2 of 2 verdicts are the expected ones."),
+        ({}, 0, "2 of 2 verdicts are as expected."),
         ({"expects": "refuted"}, 1, f"{HEAD['id']}: holds, expected: refuted"),
         ({"integral": {"value": "Omega3*sqrt(A - 5)/sqrt(A - 5)"}}, 3, f"{HEAD['id']}: undecided, expected: holds"),
         ({"integral": {"value": "Omega3 +"}}, 3, f"{HEAD['id']}: undecided, expected: holds;"),

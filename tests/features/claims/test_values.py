@@ -286,7 +286,7 @@ def test_scales_times_and_digits_far_from_one() -> None:
         ({"values": [{"quantity": "gamma", "number": "1", "time": "0"}]}, "gamma of a component that is not named"),
         ({"top": TOP | {"rotor": ["1", "0"]}}, "top.rotor must be a list of length >= 3"),
         ({"values": [one("omega", 0, "1")]}, ">= 1"),
-        ({"values": [one("omega", 1, "1"), one("omega", 1, "2", "0.0")]}, "stands in value 1 already"),
+        ({"values": [one("omega", 1, "1"), one("omega", 1, "2", "0.0")]}, "is in value 1 already"),
         ({"values": [one("omega", 1, "1", tolerance="-1")]}, "negative"),
         ({"values": [one("omega", 1, "1", tolerance="nan")]}, "tolerance"),
         ({"values": [one("omega", 1, "1", "inf")]}, "time"),

@@ -24,8 +24,8 @@ def audit(
     system: Annotated[
         str | None, typer.Option(help="heavy_top, gyrostat or heavy_gyrostat; without it that of the file.")
     ] = None,
-    branch: Annotated[str | None, typer.Option(help="smooth or printed: that branch alone.")] = None,
-    library: Annotated[bool, typer.Option("--library", help="All of `heavytop claims`, three minutes.")] = False,
+    branch: Annotated[str | None, typer.Option(help="Only that branch: smooth or printed.")] = None,
+    library: Annotated[bool, typer.Option("--library", help="Audit all of `heavytop claims`: three minutes.")] = False,
     json: Json = False,
 ) -> int:
     """Prove or refute a claimed motion, by equation.
@@ -41,7 +41,9 @@ def audit(
         if not library:
             raise InputError("No claim was given.", "Give a name of `heavytop claims`, a TOML file, or --library.")
         if claim or system is not None or branch is not None:
-            raise InputError("--library audits every claim as it is.", "Leave out the claim, --system and --branch.")
+            raise InputError(
+                "--library audits every claim of the library.", "Leave out the claim, --system and --branch."
+            )
         return _library(json)
     if branch is not None:
         require_branch(branch)

@@ -35,7 +35,7 @@ def claims_text(listing: ClaimLibrary) -> RenderableType:
                 source = f"{', '.join(entry.source.authors)} {entry.source.year}"
                 parts += [Text(f"  {entry.id}"), *map(Text, _folded(f"{entry.title} ({source})", 4))]
             parts.append(Text())
-    return Group(*parts, Text("heavytop audit NAME shows the proof or the witness of one."))
+    return Group(*parts, Text("heavytop audit NAME shows the proof or the witness."))
 
 
 def _folded(text: str, indent: int) -> list[str]:
@@ -47,14 +47,14 @@ def unexpected_text(listing: ClaimLibrary) -> RenderableType:
     """The number of expected verdicts, and each unexpected one."""
     unexpected = [entry for entry in listing.entries if entry.id in (*listing.changed, *listing.undecided)]
     expected = len(listing.entries) - len(unexpected)
-    lines = [Text(f"{expected} of {len(listing.entries)} verdicts are the expected ones.")]
+    lines = [Text(f"{expected} of {len(listing.entries)} verdicts are as expected.")]
     for entry in unexpected:
         judged = listing.verdicts[entry.id]
         difference = f"{entry.id}: {judged.verdict}, expected: {entry.expects}"
         difference += f"; {judged.reason}" if judged.reason else ""
         lines.append(Text(fill(difference, _WIDTH, subsequent_indent="  "), style=_STYLES[judged.verdict]))
     seconds = sum(judged.seconds for judged in listing.verdicts.values())
-    return Group(*lines, Text(f"{seconds:.0f} s of audits."))
+    return Group(*lines, Text(f"The audits took {seconds:.0f} s."))
 
 
 # The audit of published numbers as a table.
@@ -70,7 +70,7 @@ def values_text(rows: Sequence[StatementVerdict]) -> list[RenderableType]:
     Below the table the proven values, with their radii, and how the motion is known.
     """
     table = Table(box=None, pad_edge=False)
-    for name in ("number", "at", "verdict", "printed", "digits right", "allowed", "off by"):
+    for name in ("number", "at", "verdict", "printed", "digits right", "allowed", "error"):
         table.add_column(name, overflow="fold", no_wrap=name in ("number", "at", "verdict", "digits right"))
     for row in rows:
         figures = row.figures or {}
@@ -84,7 +84,7 @@ def values_text(rows: Sequence[StatementVerdict]) -> list[RenderableType]:
         known = (row.figures or {})["proven"]
         lines.append(Text(f"  {label(row)} {row.domain}: {known['value']} +/- {known['radius']}"))
     methods = dict.fromkeys(row.note for row in rows if row.note)
-    return [table, Text(), *lines, *(Text(f"Known from {method}.") for method in methods)]
+    return [table, Text(), *lines, *(Text(f"Reference: {method}.") for method in methods)]
 
 
 def label(row: StatementVerdict) -> str:
@@ -99,7 +99,7 @@ _PROVEN = {
     "motion": "Its equations of motion are proven for",
     "component": "It is proven for",
     "integral": "It is proven to be constant along the motions of",
-    "relation": "It is proven to be kept by the motions of",
+    "relation": "It is proven to be invariant under the motions of",
     "stability": "The constant solution is proven for",
 }
 _SYMBOLS = """\
@@ -127,10 +127,10 @@ def audit_text(report: Audit) -> RenderableType:
     if report.unused:
         parts.append(Text(f"No formula uses {', '.join(report.unused)} of [parameters]."))
     if report.why:
-        parts += [Text(), Text("Why, each step checked by the same algebra:")]
+        parts += [Text(), Text("Explanation, each step checked by the same algebra:")]
         parts += [Text(f"  [{VERDICTS[step.holds]}] {step.statement}") for step in report.why]
     parts += _entry(report)
-    solved = ", ".join(report.solves) or "none of the systems known here"
+    solved = ", ".join(report.solves) or "none of the systems"
     where = f", where {' and '.join(f'{text} = 0' for text in report.where)}" if report.where and report.solves else ""
     parts += [Text(), *map(Text, _folded(f"{_PROVEN[report.kind]}: {solved}{where}", 0))]
     return Group(*parts)
@@ -141,8 +141,12 @@ def _entry(report: Audit) -> list[RenderableType]:
     entry = report.entry
     if entry is None:
         return []
-    expected = "as expected" if report.verdict == entry.expects else f"expected: {entry.expects}"
-    return [Text(), Text(f"Read: {entry.read}; {entry.status}; {expected}."), Text(" ".join(entry.note.split()))]
+    expected = "as expected" if report.verdict == entry.expects else f"{entry.expects} was expected"
+    return [
+        Text(),
+        Text(f"Read: {entry.read}. Status: {entry.status}. Verdict: {expected}."),
+        Text(" ".join(entry.note.split())),
+    ]
 
 
 def _table(report: Audit) -> Table:

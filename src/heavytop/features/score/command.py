@@ -32,7 +32,9 @@ _STATE_SECONDS = 1e-3
 def score(
     trajectories: Annotated[
         list[Path],
-        typer.Argument(metavar="TRAJECTORY...", help="Files of trajectories (`heavytop docs score`); - is standard input."),
+        typer.Argument(
+            metavar="TRAJECTORY...", help="Files of trajectories (`heavytop docs score`); - is standard input."
+        ),
     ],
     case: Annotated[
         str | None, typer.Option(help="Built-in case that gives top and start.", autocompletion=cases)

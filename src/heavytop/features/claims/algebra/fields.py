@@ -310,7 +310,7 @@ class Field:
             return self.transcendental.jacobi(name, first, arguments[1])
         if name in INVERSE or name in FREE:
             return self.transcendental.function(name, tuple(arguments))
-        raise Unprovable(f"{name} has no place in the algebra.")
+        raise Unprovable(f"The algebra does not support {name}.")
 
     def _power(self, e: sympy.Expr) -> Quotient:
         base, exponent = e.args

@@ -39,7 +39,7 @@ from heavytop.precision import shown
 
 
 _EVERYWHERE = "proven on the whole domain"
-KEPT = "kept by the flow: where it is so at first, it stays so"
+KEPT = "invariant under the flow: it holds at all times if it holds initially"
 # rational, with |γ| = 1, on no surface of low degree with small coefficients
 _SOME_STATE = {
     **dict(zip(("Omega1", "Omega2", "Omega3"), (Fraction(17, 13), Fraction(-29, 31), Fraction(37, 23)), strict=True)),
@@ -359,8 +359,8 @@ class Region:
 _CONTINUOUS = "the formulas are real and continuous on the whole domain"
 _ATTITUDE = "the attitude of the angles is continuous inside the domain"
 _SAMPLE = "every formula is defined and real at a sample in the domain"
-_DIVISORS = "the algebra divides by nothing that is 0"
-_ALGEBRA = "the algebra can carry the formulas"
+_DIVISORS = "no divisor in the algebra vanishes"
+_ALGEBRA = "the algebra can represent the formulas"
 _REMOVABLE = "removable: the formulas are continuous across it"
 _AT_THE_END = "proven inside the domain, removable in gamma at its end"
 
@@ -466,7 +466,7 @@ class Prover:
                 divisors = [*halves[0], *halves[1]]
         if divisors is None:
             return False, []
-        return True, [Condition(_DIVISORS, False, f"it divides by {text}") for text in divisors]
+        return True, [Condition(_DIVISORS, False, f"a divisor is {text}") for text in divisors]
 
     def _zero_in(self, region: Region | None, statement: Statement) -> list[str] | None:
         """The divisors that are obstacles to the proof; None without a proof."""
@@ -488,15 +488,15 @@ class Prover:
         if not sample_points:
             return Condition(_SAMPLE, False, self._why_no_sample(statement))
         if any(self.is_defined(statement, point) for point in sample_points):
-            return Condition(_SAMPLE, True, "checked in balls")
-        return Condition(_SAMPLE, False, "at no sample in the domain is every formula defined and real")
+            return Condition(_SAMPLE, True, "checked in ball arithmetic")
+        return Condition(_SAMPLE, False, "at every sample in the domain a formula is undefined or not real")
 
     def _why_no_sample(self, statement: Statement) -> str:
         setting = self._setting
         if not setting.samples:
             return "no exact state is known: give samples at which the start is rational and moves, or states"
         if not any(all(need.is_met(sample) for need in setting.bodies) for sample in setting.samples):
-            return "at no sample is each principal moment at most the sum of the others: no body has such moments"
+            return "at every sample a principal moment exceeds the sum of the others: no body has such moments"
         region = self._region(statement, statement.domain.sign, strict=False)
         if region is not None and region.field.never_zero_on_relations():
             within = " within |gamma| = 1" if statement.flow is not None else ""
@@ -530,7 +530,7 @@ class Prover:
         everywhere = self._region(statement, domain.sign, strict=bool(domain.sign) and not ends)
         inner = self._region(statement, domain.sign, strict=True) if ends else everywhere
         if everywhere is None or inner is None:
-            return [Condition(_ALGEBRA, False, "the formulas are too large, or hold what it does not know")]
+            return [Condition(_ALGEBRA, False, "the formulas are too large, or contain unsupported functions")]
         # a function of first integrals alone is constant, continuous or not
         moving = [value for value in f.values if not _is_kept(value, statement)]
         obstacles = everywhere.obstacle(moving), inner.obstacle(f.attitude)
@@ -562,7 +562,7 @@ class Prover:
         for text, rate in statement.flow.kept if statement.flow is not None else ():
             obstacle = region.leaves(rate)
             reason = obstacle or "its rate is a combination of the conditions"
-            yield Condition(f"{text} = 0 is kept by the flow", not obstacle, reason)
+            yield Condition(f"{text} = 0 is invariant under the flow", not obstacle, reason)
 
 
 def _missed(statement: Statement, setting: Setting) -> str:

@@ -98,7 +98,7 @@ def _defined(name: str, formula: Formula) -> Formula:
 
 def _parse(text: str, names: Mapping[str, Formula], where: str) -> Formula:
     if len(text) > _MAX_LENGTH:
-        raise InputError(f"{where}: {len(text)} characters.", f"A formula has at most {_MAX_LENGTH}.")
+        raise InputError(f"{where}: {len(text)} characters.", f"Use at most {_MAX_LENGTH} characters.")
     parser = _Parser(text, names, where)
     result = parser.sum()
     parser.end()
@@ -163,7 +163,7 @@ class Descent:
     def end(self) -> None:
         """Raises an error for remaining tokens."""
         if self._next():
-            raise self._error(f"{self._next()[:20]!r} was not expected")
+            raise self._error(f"unexpected {self._next()[:20]!r}")
 
     def _no_token(self, text: str) -> Exception:
         return self._error(f"{text.strip()!r} is not part of a formula")
@@ -187,7 +187,7 @@ class _Parser(Descent):
         )
 
     def _error(self, what: str) -> InputError:
-        return InputError(f"{self._where}: {what}.", "See `heavytop docs claims-in-toml` for what a formula may hold.")
+        return InputError(f"{self._where}: {what}.", "`heavytop docs claims-in-toml` lists what a formula may contain.")
 
     def sum(self) -> Formula:
         """Parses a sum."""
@@ -302,7 +302,7 @@ class _Parser(Descent):
         for what, value, limit in zip(ExpressionBounds._fields, size, limits, strict=True):
             if value > limit:
                 raise TooLarge(
-                    f"{self._where}: the formula grows beyond {limit} {what}.", "Name parts of it in [definitions]."
+                    f"{self._where}: the formula grows beyond {limit} {what}.", "Define parts of it in [definitions]."
                 )
 
 
@@ -328,7 +328,7 @@ def comparisons(text: str, where: str) -> list[tuple[str, str, ConditionKind]]:
     parts = [part.strip() for part in re.split(r"([<>]=?)", text)]
     sides, signs = parts[::2], parts[1::2]
     if len({sign[0] for sign in signs}) != 1 or not all(sides) or "=" in "".join(sides):
-        raise InputError(f"{where}: {text[:60]!r} is not understood.", f"Write: formula > formula{_OR[where]}.")
+        raise InputError(f"{where}: {text[:60]!r} cannot be parsed.", f"Write: formula > formula{_OR[where]}.")
     pairs = [pair if signs[0][0] == ">" else pair[::-1] for pair in pairwise(sides)]
     return [(*pair, SIGNS[sign.replace("<", ">")]) for pair, sign in zip(pairs, signs, strict=True)]
 
@@ -342,7 +342,7 @@ def assumptions(texts: Iterable[str]) -> Iterator[tuple[str, str, ConditionKind]
         elif left and right and not set("<>=!") & {*left, *right}:
             yield left, right, SIGNS[sign]
         else:
-            raise InputError(f"assume: {text[:60]!r} is not understood.", "Write: formula != formula.")
+            raise InputError(f"assume: {text[:60]!r} cannot be parsed.", "Write: formula != formula.")
 
 
 def assume(

@@ -51,7 +51,7 @@ _TABLES: dict[str, tuple[str, Callable[[ClaimFile], FileClaim]]] = {
 }
 """The table that each kind of claim needs, and its class."""
 _MAX_BYTES = 100_000
-_REMEDY = "`heavytop docs claims-in-toml` has the format, with examples."
+_REMEDY = "`heavytop docs claims-in-toml` describes the format, with examples."
 
 
 def read_claim(path: Path) -> FileClaim | ValueClaim:
@@ -60,7 +60,7 @@ def read_claim(path: Path) -> FileClaim | ValueClaim:
     with readable(path, remedy), path.open("rb") as stream:
         raw = stream.read(_MAX_BYTES + 1)
     if len(raw) > _MAX_BYTES:
-        raise InputError(f"{path} is longer than {_MAX_BYTES} bytes.", "A claim is a page of formulas.")
+        raise InputError(f"{path} is longer than {_MAX_BYTES} bytes.", "Shorten it: a claim is a page of formulas.")
     try:
         table = tomllib.loads(raw.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:  # an integer of too many digits is a ValueError of its own
@@ -91,7 +91,9 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> FileClaim | ValueC
     if content.quadrature is not None and needed == "integral":
         raise InputError(f"{where}: [quadrature] is about a motion, and kind = {content.kind!r}.", _REMEDY)
     if content.domain not in ("all", "t<=0", "t>0"):
-        raise InputError(f"{where}: domain = {content.domain[:40]!r}.", 'Use "all", "t<=0" or "t>0".')
+        raise InputError(
+            f'{where}: domain must be "all", "t<=0" or "t>0"; got {content.domain[:40]!r}.', "Give one of these."
+        )
     content = msgspec.structs.replace(content, entry=entry)
     with prefixed(where):
         return claim_class(content)
@@ -107,7 +109,7 @@ def _value_claim(table: Mapping[str, Any], entry: Entry | None, where: str) -> V
             return ValueClaim(msgspec.convert(table, ValueFile), entry)
     except (msgspec.ValidationError, RecursionError) as error:
         cause = re.sub(r"\bvalue\[(\d+)\](\.)?", counted_from_1, invalid(error, ValueFile))
-        raise InputError(f"{where}: {cause}.", f"Numbers are text, as they are printed. {_REMEDY}") from None
+        raise InputError(f"{where}: {cause}.", f"Give numbers as text, as they are printed. {_REMEDY}") from None
 
 
 PAPER = ("ershkov-general", "ershkov-partial")
@@ -165,7 +167,7 @@ def only_branch(report: Audit, branch: str) -> Audit:
     require_branch(branch)
     rows = tuple(row for row in report.rows if row.branch == branch)
     if not rows:
-        raise InputError(f"{report.claim} says nothing on the {branch} branch.", "Leave out --branch.")
+        raise InputError(f"{report.claim} has no equations on the {branch} branch.", "Leave out --branch.")
     return replace(report, rows=rows)
 
 

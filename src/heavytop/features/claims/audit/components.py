@@ -218,7 +218,7 @@ class UserComponent(UserIntegral):
                 text = f"{name}' of the angles"
                 claims.append(("rate", index, claimed.expression, above, below, text, claimed.needs))
         if not claims:
-            raise InputError("[component] claims nothing.", "Give reduced, or rates of angles in [quadrature].")
+            raise InputError("[component] makes no claim.", "Give reduced, or rates of angles in [quadrature].")
         zeros = [*(part.expression for part in self.where), OFF_SPHERE]
         known = self._known_components()
         for equation, index, claimed, above, below, text, needs in claims:
@@ -267,7 +267,7 @@ class UserComponent(UserIntegral):
         zeros = [*(part.expression for part in self.where), OFF_SPHERE]
         through = _through(self._u, self.quantity.expression, zeros, _rate_of_angle(name, omega))
         if through is None:
-            raise InputError(f"The rate of {name} is no function of {self._u}.", f"Give {name} by its rate alone.")
+            raise InputError(f"The rate of {name} is not a function of {self._u}.", f"Give {name} by its rate alone.")
         needs = condition("/", (through[1],)) | condition("/", (through[2],))
         return replace(symbol(through[0] / through[1]), needs=needs)
 

@@ -186,10 +186,10 @@ def read_tensor(inertia: Sequence[str | list[str]]) -> tuple[str, ...]:
     """
     if all(isinstance(part, list) for part in inertia):
         if len(inertia) != 3 or any(len(row) != 3 for row in inertia):
-            raise InputError("top.inertia: the rows are not 3 of 3.", _REMEDY)
+            raise InputError("top.inertia must have three rows of three.", _REMEDY)
         return tuple(text for row in inertia for text in row)
     if not all(isinstance(part, str) for part in inertia) or len(inertia) not in (3, 6, 9):
-        raise InputError(f"top.inertia: {len(inertia)} entries.", _REMEDY)
+        raise InputError(f"top.inertia must have 3, 6 or 9 entries; got {len(inertia)}.", _REMEDY)
     texts = tuple(str(part) for part in inertia)
     return tuple(texts[index] for index in _ORDER) if len(texts) == 6 else texts
 
@@ -226,7 +226,7 @@ _SAMPLE_BITS = 512
 _MOST_BITS = 6_640
 """The most bits of numerator and denominator of a number in a sample: 2000 digits."""
 _OF_THE_TOP = "The moments, the weight, the centre of mass and k of a top are constant: use numbers and parameters."
-_OF_PARAMETERS = "Relations are between parameters; conditions on the state stand in where of [integral]."
+_OF_PARAMETERS = "Relations may contain parameters only; put conditions on the state into where of [integral]."
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,15 +275,15 @@ class Context:
             cause = "gyrostat has its rotor on a principal axis, and top.inertia has products of inertia."
             raise InputError(cause, "Give the three principal moments, or use heavy_gyrostat.")
         if system is GYROSTAT and self.rotor is None:
-            raise InputError("The file gives no rotor, so it says nothing about gyrostat.", "Add rotor to [top].")
+            raise InputError("gyrostat needs a rotor, and the file gives none.", "Add rotor to [top].")
         return self.top._replace(rotor=sympy.Integer(0) if self.rotor is None else self.rotor)
 
 
 def _other_rotor(system: System) -> InputError:
     if system is HEAVY_GYROSTAT:
-        cause = "The file gives no rotor of three components, so it says nothing about heavy_gyrostat."
+        cause = "heavy_gyrostat needs a rotor of three components."
         return InputError(cause, "Add rotor = [k1, k2, k3] to [top].")
-    cause = f"The file gives a rotor of three components, so it says nothing about {system.name}."
+    cause = f"{system.name} does not take a rotor of three components."
     return InputError(cause, "Use the system heavy_gyrostat, or give no such rotor.")
 
 
@@ -295,7 +295,7 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
         if name in content.parameters and name in content.definitions:
             raise InputError(f"The name {name!r} is a parameter and a definition.", "Rename one of them.")
         if name in reserved:
-            raise InputError(f"The name {name!r} is taken.", f"Taken are {', '.join(sorted(reserved))}.")
+            raise InputError(f"The name {name!r} is reserved.", f"Reserved names: {', '.join(sorted(reserved))}.")
     texts = list(assumptions(content.assume))
     tensor = read_tensor(content.top.inertia)
     diagonal = tensor if len(tensor) == 3 else tensor[::4]
@@ -381,7 +381,7 @@ def _check_samples(context: Context, compared: Sequence[Comparison]) -> None:
         values = ", ".join(f"{name} = {value}" for name, value in sample.items())
         broken = next(_broken(context, sample, compared), None)
         if broken is not None:
-            cause = f"The sample {values or 'without parameters'} breaks the {written(broken)}."
+            cause = f"The sample {values or 'without parameters'} violates the {written(broken)}."
             raise InputError(cause, "Change the sample.")
         for index, moment in enumerate(minors(context.top.inertia), 1):
             if not (ball := _at(moment, sample)) > 0:
@@ -437,7 +437,7 @@ def _at(expression: sympy.Expr, sample: dict[sympy.Symbol, Fraction]) -> arb:
         return evaluate(expression, sample, _SAMPLE_BITS)
     except (KeyError, Unprovable):
         raise InputError(
-            f"{written(str(expression))[:80]} is not a number at a sample.", "It may hold parameters only."
+            f"{written(str(expression))[:80]} is not a number at a sample.", "Use parameters only."
         ) from None
 
 
@@ -477,7 +477,7 @@ def of_file(requested: System | None, written: str | None, default: System) -> S
     """The system requested, else the one written in a file, else the default; raises InputError where two differ."""
     of_claim = None if written is None else system(written)
     if requested is not None and of_claim is not None and requested is not of_claim:
-        cause = f"The file is about {of_claim.name}, but {requested.name} was asked for."
+        cause = f"The file is about {of_claim.name}, but {requested.name} was requested."
         raise InputError(cause, "Give the system of the file, or none.")
     return requested or of_claim or default
 
@@ -518,8 +518,8 @@ def variable_of(content: ClaimFile) -> sympy.Symbol:
         return TIME
     name = content.quadrature.variable
     if name in RESERVED:
-        taken = f"Taken are {', '.join(sorted(RESERVED))}."
-        raise InputError(f"The name {name!r} of the variable of [quadrature] is taken.", taken)
+        taken = f"Reserved names: {', '.join(sorted(RESERVED))}."
+        raise InputError(f"The name {name!r} of the variable of [quadrature] is reserved.", taken)
     return sympy.Symbol(name, real=True)
 
 
@@ -537,11 +537,11 @@ def read_clock(content: ClaimFile, context: Context) -> Clock:
     clock = parse(text, context.names, "quadrature")
     integrand = clock.expression if table.time is None else rate_along({u: sympy.Integer(1)})(clock.expression)
     if integrand == 0:
-        raise InputError(f"[quadrature]: t = {text[:60]} does not move with {u}.", "Give t as a function of it.")
+        raise InputError(f"[quadrature]: t = {text[:60]} does not depend on {u}.", "Give t as a function of it.")
     where = "where of [quadrature]"
     links = [link for text in table.where for link in comparisons(text, where)]
     if any(kind is not ConditionKind.POSITIVE for *_, kind in links):
-        raise InputError(f"{where}: a bound of {u} is not a value of it.", "Write < and > in the place of <= and >=.")
+        raise InputError(f"{where}: the bounds of {u} must be strict.", "Write < and > in place of <= and >=.")
     sides = [[parse(side, context.names, where) for side in link[:2]] for link in links]
     facts = tuple(above.expression - below.expression for above, below in sides)
     label = ", ".join(table.where) or f"all {u}"

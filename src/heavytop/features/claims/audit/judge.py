@@ -205,7 +205,7 @@ def _judge_one(statement: Statement, setting: Setting, prover: Prover) -> Statem
                 return _row(statement, False, left, conditions, witness)
     if certain:
         return _row(statement, True, "0", conditions)
-    residual = "0 where the conditions are met" if proven else _bound(statement, prover)
+    residual = "0 if the conditions hold" if proven else _bound(statement, prover)
     return _row(statement, None, residual, conditions)
 
 

@@ -279,7 +279,7 @@ def _figures(tables: Sequence[ValueTable]) -> Iterator[Figure]:
             raise InputError(f"{place}: {table.quantity[:40]} {lacks}.", f"Its components are 1 to {size}.")
         subject = time, table.quantity, component
         if indices.setdefault(subject, index) != index:
-            repeated = f"{table.quantity[:40]} {component} at t = {table.time[:40]} stands in value {indices[subject]}"
+            repeated = f"{table.quantity[:40]} {component} at t = {table.time[:40]} is in value {indices[subject]}"
             raise InputError(f"{place}: {repeated} already.", "Give each number once.")
         tolerance = None if table.tolerance is None else _number(table.tolerance, f"{place}: tolerance")
         if tolerance is not None and tolerance < 0:

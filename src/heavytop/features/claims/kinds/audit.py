@@ -54,8 +54,8 @@ class AuditTable(PlanTable, tag=NAME):
             return tuple(paper_claim(claim).about(system).name for system in requested) or (HEAVY_TOP.name,)
         if requested and claim in library() and (own := own_system(claim)) not in self.systems:
             raise InputError(
-                f"The claim {claim} is about {own}, and systems = {quoted(list(self.systems))}.",
-                "Leave systems out: an entry of the library is about that of its file.",
+                f"The claim {claim} is about {own}, but systems = {quoted(list(self.systems))}.",
+                "Leave systems out: the file of an entry defines its system.",
             )
         return ("",)
 
@@ -124,7 +124,7 @@ class AuditKind(Kind):
 
 
 _CLAIM = "Ershkov's motion of the heavy top (γ ∥ M)"
-_COLUMNS = ("claim", "of", "verdict", "equations proven", "refuted", "source")
+_COLUMNS = ("claim", "system", "verdict", "equations proven", "refuted", "source")
 
 
 def _of_paper(rows: Sequence[Row]) -> Headline:
@@ -134,7 +134,9 @@ def _of_paper(rows: Sequence[Row]) -> Headline:
     solved = " and ".join(_SYSTEMS.get(name, name) for name in dict.fromkeys(others))
     if "refuted" in verdicts:
         some = "" if verdicts == {"refuted"} else ", in some cases"
-        return Headline(_CLAIM + some + (f"; it is one of {solved}." if others else "."), Word("refuted"), _EVERYWHERE)
+        return Headline(
+            _CLAIM + some + (f"; it is a motion of {solved}." if others else "."), Word("refuted"), _EVERYWHERE
+        )
     if verdicts == {"holds"}:
         return Headline(_CLAIM + ": every equation is proven.", Word("holds"), _EVERYWHERE)
     return Headline(_CLAIM + ": not refuted, but not every equation is proven.", Word("undecided"), _EVERYWHERE)

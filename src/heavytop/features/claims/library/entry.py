@@ -84,7 +84,7 @@ def split(table: Mapping[str, Any], where: str) -> tuple[Entry | None, dict[str,
     if "id" not in table:
         return None, dict(table)
     if "name" in table:
-        raise InputError(f"{where}: both name and id are given.", "An entry has an id and a title, and no name.")
+        raise InputError(f"{where}: name and id were given.", "Give id and title, and no name.")
     try:
         entry = msgspec.convert({key: table[key] for key in _KEYS if key in table}, Entry)
     except (msgspec.ValidationError, RecursionError) as error:
@@ -97,7 +97,7 @@ def read_entry(path: Path) -> Entry:
     """The entry in a file of the library."""
     entry, _ = split(tomllib.loads(path.read_text("utf-8")), path.name)
     if entry is None or entry.id != path.stem:
-        raise InputError(f"{path.name}: id is not the name of the file.", _REMEDY)
+        raise InputError(f"{path.name}: id must be the name of the file.", _REMEDY)
     return entry
 
 

@@ -93,7 +93,7 @@ class _PaperClaim:
         about = HEAVY_TOP if requested is None else requested
         if about not in SYSTEMS:
             names = " or ".join(system.name for system in SYSTEMS)
-            raise InputError(f"The paper says nothing about {about.name}.", f"Use {names}.")
+            raise InputError(f"The paper makes no claim about {about.name}.", f"Use {names}.")
         return about
 
     def statements(self: Any, system: System) -> list[Statement]:
