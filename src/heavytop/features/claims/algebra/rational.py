@@ -175,7 +175,7 @@ class Tower(PolynomialRing):
         return self.polynomial(self._absolute(value.numerator)) / self.polynomial(self._absolute(value.denominator))
 
     def _absolute(self, p: fmpq_mpoly) -> fmpq_mpoly:
-        constant, factors = p.factor()
+        constant, factors = self.signs.factors(p)
         result = self.context.constant(abs(constant))
         for factor, power in factors:
             sign = self.signs.of(factor).value
@@ -192,7 +192,7 @@ class Tower(PolynomialRing):
 
     def _root(self, p: fmpq_mpoly) -> Quotient:
         """√p: absolute values of squares, times a root for each factor of known sign and one for the others."""
-        constant, factors = p.factor()
+        constant, factors = self.signs.factors(p)
         outside, radicand, sign = self.one, self.one, 1 if constant > 0 else -1
         roots = []
         for factor, power in factors:
