@@ -5,9 +5,7 @@ from typing import Any
 import pytest
 
 from heavytop.errors import InputError
-from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.features.claims.audit.judge import Audit
-from heavytop.top.equations import GYROSTAT
 from support.claim_tables import audited, open_conditions, top
 
 # Lagrange's top between the heights u1 and u2, from rest at u1, with numbers
@@ -180,14 +178,32 @@ def test_the_start_gives_the_gyrostats_energy_to_a_gyrostat() -> None:
         },
     }
     assert audited(table | {"system": "gyrostat"}).verdict == "holds"
-    claim = claim_from_table({"name": "x", **table}, "x")
-    assert audit_claim(claim, GYROSTAT).verdict == "holds"
-    assert audit_claim(claim).verdict == "refuted"
+    assert audited(table, "gyrostat").verdict == "holds"
+    assert audited(table).verdict == "refuted"
+
+
+@pytest.mark.parametrize(
+    ("where", "start", "reduced", "value", "verdict"),
+    [
+        (["Omega3 - 2"], True, "1 - u^2", "cos(t)", "holds"),
+        (["Omega3 - 10"], True, "25*(1 - u^2)", "cos(5*t)", "refuted"),  # not where it starts
+        (["Omega3 - 2", "Omega1^2 + Omega2^2 - 1"], False, "1 - u^2", None, "holds"),
+        (["Omega3 - 2", "Omega3 - 10"], False, "25*(1 - u^2)", None, "undecided"),
+        (["Omega3 - 2", "Omega1^2 + Omega2^2 + 1"], False, "-1 - u^2", None, "undecided"),
+    ],
+)
+def test_there_is_a_state_on_the_conditions(
+    where: list[str], start: bool, reduced: str, value: str | None, verdict: str
+) -> None:
+    """Anything follows from conditions that exclude each other, and falsehoods from one that the start is not on."""
+    component = {"quantity": "Omega1", "where": where, "reduced": reduced, "value": value, "constants": ["Omega3"]}
+    table = {"start": CIRCLE["start"] if start else None, "component": {k: v for k, v in component.items() if v}}
+    assert audited(CIRCLE | table).verdict == verdict
 
 
 SEED: dict[str, Any] = {
     "kind": "component",
-    "parameters": {"C1": ["1", "3/2"]},
+    "parameters": {"C1": "1/6"},  # with Ω = (1/3, 0, 0) on both conditions
     "definitions": {"f1": "(6*C1 - 1)/2 - 6*u - u^2", "f2": "(1 - 2*C1)/6 + 2/3*u - u^2/3"},
     "top": top(),
     "component": {

@@ -494,7 +494,7 @@ class Prover:
     def _why_no_sample(self, statement: Statement) -> str:
         setting = self._setting
         if not setting.samples:
-            return "no exact state is known: give samples at which the start is rational and moves, or states"
+            return "no exact state is known: give a start that is rational at the samples and moves, or states"
         if not any(all(need.is_met(sample) for need in setting.bodies) for sample in setting.samples):
             return "at every sample a principal moment exceeds the sum of the others: no body has such moments"
         region = self._region(statement, statement.domain.sign, strict=False)

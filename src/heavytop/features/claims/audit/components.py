@@ -8,7 +8,7 @@ quadrature t = ∫ du/√f(u) and the rates of angles are statements on the stat
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
@@ -17,7 +17,7 @@ import sympy
 from msgspec import structs
 
 from heavytop.errors import InputError
-from heavytop.features.claims.algebra.conditions import ConditionKind, Need, condition, is_exactly_zero
+from heavytop.features.claims.algebra.conditions import ConditionKind, Need, condition, is_exactly_zero, written
 from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.prover import shortest
 from heavytop.features.claims.algebra.rational import forces_zero
@@ -167,9 +167,11 @@ class UserComponent(UserIntegral):
         """Statements with their settings: in u, on the state where they are no functions of u, and in time."""
         in_u, on_state = self._reduced(system)
         squares = [s for s in on_state if s.equation == "reduced"]
+        states, base = self.at_states, setting_of(self.context, self._u)
         # where u is constant, u'^2 = f(u) does not imply u'' = f'(u)/2
-        for statements, setting in ((in_u, setting_of(self.context, self._u)), (squares, self.at_states)):
-            yield statements, replace(setting, samples=tuple(s for s in setting.samples if self._moves(system, s)))
+        moving = [s for s in states.samples if self._moves(system, s) and _is_at(s, states.relations)]
+        yield in_u, replace(base, samples=tuple(s for s in base.samples if any(s.items() <= m.items() for m in moving)))
+        yield squares, replace(states, samples=tuple(moving))
         yield [s for s in on_state if s.equation != "reduced"], self.at_states
         yield self._in_time(system), setting_of(self.context, TIME)
 
@@ -298,7 +300,10 @@ class UserComponent(UserIntegral):
         for component, (ours, theirs) in enumerate(begin, 1):
             residual = at_values(ours, {TIME: sympy.Integer(0)}) - self._at_start(theirs)
             equations.append(made("start", component, residual, f"u{chr(39) * (component - 1)} at t = 0", at_zero))
-        equations.append(made("start", 3, self._at_start(OFF_SPHERE), "|gamma|^2 = 1 at t = 0", at_zero))
+        claimed_zero = [part.expression for part in self.where[: len(self._component.where)]]
+        on_start = {OFF_SPHERE: "|gamma|^2 = 1", **{part: f"{written(str(part))} = 0" for part in claimed_zero}}
+        for component, (part, text) in enumerate(on_start.items(), 3):
+            equations.append(made("start", component, self._at_start(part), f"{text} at t = 0", at_zero))
         for index, name in enumerate(_ANGLES, 1):
             angle, claimed = self._of(name, self._component), self._of(name, self.content.quadrature)
             if angle is not None:
@@ -310,6 +315,11 @@ class UserComponent(UserIntegral):
                     made("angle", index, residual, f"{name}' of {name}", Formulas((c, angle.expression), needs))
                 )
         return equations
+
+
+def _is_at(state: Mapping[sympy.Symbol, Fraction], zeros: Iterable[sympy.Expr]) -> bool:
+    """Whether the formulas are proven to be 0 at a state."""
+    return all(is_exactly_zero(zero, state) for zero in zeros)
 
 
 def _put(needs: frozenset[Need], values: Mapping[sympy.Expr, sympy.Expr]) -> frozenset[Need]:

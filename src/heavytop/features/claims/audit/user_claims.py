@@ -432,7 +432,8 @@ class UserIntegral(FileClaim):
         super().__init__(content)
         table, names = self._table, self.context.names
         self.value = parse(table.value, names, "integral.value")
-        self.where = tuple(parse(text, names, "integral.where") for text in table.where)
+        where = "component.where" if content.integral is None else "integral.where"
+        self.where = tuple(parse(text, names, where) for text in table.where)
         _check_states(table)
         self.context = self._with_constant_rotor()
 
