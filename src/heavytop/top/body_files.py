@@ -16,6 +16,7 @@ from math import isqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from heavytop.display import plural
 from heavytop.errors import InputError, prefixed, quoted, refusal
 from heavytop.files import read_whole, readable
 from heavytop.precision import Vector, cross, exact, round_to, six_digits, vector
@@ -217,7 +218,10 @@ class _Numbers:
         """``count`` numbers."""
         values = self.read(text, what, default)
         if len(values) != count:
-            raise InputError(f"{self.where}: {what} must have {count} numbers; got {len(values)}.", f"Give {count}.")
+            remedy = "Give one, with a decimal point." if count == 1 else f"Give {count}."
+            raise InputError(
+                f"{self.where}: {what} must be {plural(count, 'number')}; got {quoted(text or '')}.", remedy
+            )
         return values
 
     def require_known(self, names: Iterable[str], element: Element, known: Sequence[str], what: str) -> None:

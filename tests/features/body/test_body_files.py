@@ -156,6 +156,10 @@ def test_a_tensor_multiplied_in_double_is_read_by_its_upper_entries(tmp_path: Pa
     body = ht.Body(1, 9.81, (0, 0, 0), nine)
     assert body.tensor[1][0] == body.tensor[0][1] == Fraction(0.05)
     assert judged(tmp_path / "a.toml", f"mass = 1\ninertia = {nine}")[0] == 0
+    (tmp_path / "p.toml").write_text('mass = 1\ncentre = [0, 0, 0.1]\ninertia = [1, 1, 1]\nabout = "pivot"')
+    assert (
+        "principal moments   0.99, 0.99, 1   about the centre of mass" in heavytop("body", tmp_path / "p.toml").stdout
+    )
     by_row = urdf([repr(nine[i]) for i in (0, 3, 5, 1, 2, 4)])
     assert first_slip(tmp_path / "a.urdf", by_row) == (1, "row_major")
 
@@ -512,6 +516,11 @@ REFUSED = {
     "binary USD": (("usd", "PXR-USDC...."), "binary USD"),
     # what another program has to compute, with the way out
     "xacro": (("urdf", urdf(SIX, mass="${m}")), "xacro FILE -o FILE.urdf"),
+    "a decimal comma": (
+        ("urdf", urdf(SIX, mass="2,5")),
+        "mass must be 1 number; got '2,5'.\n  Give one, with a decimal",
+    ),
+    "two of three": (("urdf", urdf(SIX, centre="0.1 0.2")), "xyz must be 3 numbers; got '0.1 0.2'"),
     "a mass of 0": (("urdf", urdf(SIX, mass="0")), "mass must be positive; got 0"),
     "inertiafromgeom": (("xml", mjcf(SIX).replace("<w", '<compiler inertiafromgeom="true"/><w', 1)), "saveLastXML"),
     "geoms alone": (in_mjcf('<geom size="1"/>'), "saveLastXML"),

@@ -123,7 +123,7 @@ class BodyAssessment:
         about = "the pivot" if self.given.at_pivot else "the centre of mass"
         yield from _labelled("inertia", ", ".join(f"{n} {decimal_text(v, _PRINTED)}" for n, v in six))
         yield f"                    about {about}"
-        yield f"principal moments   {moments}"
+        yield f"principal moments   {moments}" + "   about the centre of mass" * self.given.at_pivot
         for axis, direction in enumerate(zip(*principal.axes, strict=True)):
             label = "principal axes" if not axis else ""
             yield f"{label:<20}{', '.join(decimal_text(value, _PRINTED) for value in direction)}"
