@@ -152,3 +152,15 @@ def test_a_spacing_that_is_reduced_is_said_to_be() -> None:
     words = ("propagate", "--case", "generic", "--times", "1", "--between")
     assert "0.25 apart (0.3, reduced to a divisor of the last time)" in heavytop(*words, "0.3").stdout
     assert "reduced" not in heavytop(*words, "0.25").stdout
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        ht.HeavyTop((1, 2, 2), 1, (1, 0, 0)),
+        ht.Body("2", "9.81", ("0.1", "0", "0.3"), (1, 2, "1.5", 0, "-0.1", 0), "pivot"),
+    ],
+)
+def test_a_tensor_whose_exchanged_entries_are_equal_has_no_such_fault(body: ht.HeavyTop | ht.Body) -> None:
+    found = ht.power(body, SPINNING, 1, "1e-3", planted=["tensor_order"])
+    assert (found.faults, found.left_out) == ((), {"tensor_order": "the entries that it exchanges are equal"})

@@ -228,14 +228,21 @@ def _of_tensor(motion: Motion, times: Sequence[Fraction], tensor: Any) -> Array 
     return _rows((other, start, system), times)
 
 
+_EQUAL = "the entries that it exchanges are equal"
+
+
 def _order(motion: Motion, times: Sequence[Fraction]) -> Array | str:
     """I12 and I23 exchanged, as in the order 11, 22, 33, 23, 13, 12; of a diagonal tensor the last two moments."""
     body, start, system = motion
     if isinstance(body, HeavyTop):
         a, b, c = body.inertia
+        if b == c:
+            return _EQUAL
         return _rows((HeavyTop((a, c, b), body.weight, body.centre, body.rotor), start, system), times)
     a, b, c, d, e, f = six_of(body.tensor)
     six = (a, b, c, f, e, d) if any((d, e, f)) else (a, c, b, d, e, f)
+    if six == six_of(body.tensor):
+        return _EQUAL
     return _of_tensor(motion, times, ((six[0], six[3], six[4]), (six[3], six[1], six[5]), (six[4], six[5], six[2])))
 
 

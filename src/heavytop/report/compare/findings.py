@@ -266,7 +266,7 @@ def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[s
         keys = {msgspec.structs.replace(change.identity.key, case="") for change in changes.rows}
         names = " and ".join(_case(change.identity) for change in changes.rows)
         advice = (
-            f"Only the names differ: {names}. Rows of the same name (`# name:` of a trajectory) are compared."
+            f"Their names differ: {names}. Rows of the same name (`# name:` of a trajectory) are compared."
             if (len(keys), len(changes.rows)) == (1, 2)
             else "Were they made with the same plan?"
         )
