@@ -210,6 +210,6 @@ def test_python_gives_what_the_commands_write(reports, heavytop, capsys) -> None
     assert (printed["export"], json.loads(printed["shown"])) == (report.export("csv"), report.to_json())
     assert [over.names[i] for track in over.tracks for i in track.steps] == ["worse"]
     assert "drift_energy_max" in repr(over)
-    with pytest.raises(ht.InputError, match="two reports or more"):
+    with pytest.raises(ht.InputError, match="at least two reports"):
         ht.history([report])
     assert ht.history([report, "worse"]).to_json()["tracks"] == ht.history(["old", "worse"]).to_json()["tracks"]
