@@ -133,7 +133,7 @@ def test_a_fault_of_an_adapter_is_named_in_its_row(fault: str) -> None:
     "top", [ht.HeavyTop((5, 2, 1), 1, (0, 0, 1)), case("simo-wong").top, ht.HeavyTop((1, 1, 2), 1, (0, 0, 1))]
 )
 def test_moments_that_no_body_has_are_unsupported(top: ht.HeavyTop) -> None:
-    with pytest.raises(Unsupported, match="needs a body"):
+    with pytest.raises(Unsupported, match="needs a rigid body"):
         body_lines(top, ht.State((1, 0, 0), (0, 0, 1)))
 
 

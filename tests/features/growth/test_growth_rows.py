@@ -71,7 +71,7 @@ def test_a_special_motion_is_taken_with_other_roundings(name: str) -> None:
     for top, start in members:
         assert start == case.start
         assert case.system.field(case.system.parameters(top, start), start.flat) == case.system.field(p, start.flat)
-    with pytest.raises(InputError, match="which is one motion"):
+    with pytest.raises(InputError, match="must be at most 16384; got 16385"):
         ensemble_of(case, 2**14 + 1, 1)
 
 

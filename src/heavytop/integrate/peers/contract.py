@@ -243,7 +243,7 @@ def require_control(name: str, control: str, value: Fraction) -> None:
     """Raise InputError for a step or tolerance that is not positive, and for a tolerance above 1."""
     if value <= 0 or (control == "tolerance" and value > 1):
         rule = "above 0" if control == "step" else "above 0, up to 1"
-        raise refusal(f"The {control} of {name}", f"{rule}", six_digits(value), f"Give one {rule}.")
+        raise refusal(f"The {control} of {name}", rule, six_digits(value), f"Give one {rule}.")
 
 
 def with_tolerance(run: Run) -> Callable[..., Trajectory]:
