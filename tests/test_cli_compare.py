@@ -148,7 +148,7 @@ def test_nothing_is_written_where_a_report_is_wrong(reports, heavytop, capsys) -
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("compare old same --loss -1", "loss_bits = -1 is negative"),
+        ("compare old same --loss -1", "loss_bits must not be negative; got -1"),
         ("compare old same --floor x", "not a finite number"),
         ("compare old same --junit=", "cannot be written"),
         ("history old same --metric [x", "must be a glob"),

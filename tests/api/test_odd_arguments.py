@@ -241,7 +241,7 @@ def test_one_odd_component_is_answered_or_refused_in_words() -> None:
         (lambda: ht.score([1], np.zeros((1, 9)), top=TOP, start=START), "states[0] has 9 numbers, not 6"),
         (lambda: ht.score([1, 2], np.zeros((1, 6)), top=TOP, start=START), "equally many; got 2 and 1"),
         (lambda: ht.score([1], [[1, 2, 3]], top=TOP, start=START), "states[0] has 3 numbers"),
-        (lambda: ht.compare("nowhere", "nowhere"), "holds no report"),
+        (lambda: ht.compare("nowhere", "nowhere"), "contains no report"),
         (lambda: ht.run("smok"), "Unknown plan 'smok'"),
         (lambda: ht.audit("paper"), "Unknown claim 'paper'"),
     ],

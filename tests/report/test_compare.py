@@ -247,9 +247,9 @@ def test_a_missing_report_and_a_row_twice_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="twice"):
         store.read(tmp_path)
     twice = report(with_metric(error("1E-12")), with_metric(error("1E-3")))
-    with pytest.raises(InputError, match=r"candidate holds the row .* twice"):
+    with pytest.raises(InputError, match=r"candidate contains the row .* twice"):
         ht.compare(report(row()), twice)
-    with pytest.raises(InputError, match=r"holds the row .* twice"):
+    with pytest.raises(InputError, match=r"contains the row .* twice"):
         ht.history([report(row()), twice])
 
 

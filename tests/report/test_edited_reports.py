@@ -67,12 +67,12 @@ def test_a_candidate_may_be_noisier_by_chance_and_no_more(
 
     assert all_judged(noisy(0.1), noisy(0.1), noisy(near), noisy(far)) == ["same", "same", "worse"]
     if measure != "break_away_law":
-        assert judged(noisy(0.1), noisy(far))[1] == f"noise: {far:.1f} decades, not 0.1"
+        assert judged(noisy(0.1), noisy(far))[1] == f"noise: 0.1 → {far:.1f} decades"
         # a band too narrow to excuse anything is taken as 0.05
         assert all_judged(noisy(0.001), noisy(near / 2), noisy(far / 2)) == ["same", "worse"]
     assert judged(noisy(0.3), noisy(0.1))[0] == "same"
     assert judged(noisy(None), noisy(0.1))[0] == "same"
-    assert judged(noisy(0.1), noisy(None)) == ("incomparable", "its noise is not measured, which was 0.1 decades")
+    assert judged(noisy(0.1), noisy(None)) == ("incomparable", "its noise is not measured (was 0.1 decades)")
 
 
 def test_the_noise_allowed_for_is_that_of_the_baseline() -> None:

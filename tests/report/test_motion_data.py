@@ -49,14 +49,14 @@ def test_another_number_anywhere_is_another_motion(starts: int) -> None:
     for name, other in found:
         for old, new in ((DATA, other), (other, DATA)):
             verdict, why = judged(*(row(data=each, starts=starts) for each in (old, new)))
-            assert (verdict, why.startswith(f"other data: {name} ")) == ("incomparable", True), (name, other, why)
+            assert (verdict, why.startswith(f"different data: {name} ")) == ("incomparable", True), (name, other, why)
 
 
 def test_a_smaller_error_of_another_top_is_not_better() -> None:
     less = {"drift_energy_max": msgspec.structs.replace(row().metrics["drift_energy_max"], value="1e-15", log10=-15.0)}
     assert judged(row(data=DATA), row(data=DATA, metrics=less))[0] == "incomparable"  # the time of escape is missing
     other = replace(DATA, weight="2")
-    assert judged(row(data=DATA), row(data=other, metrics=less))[1] == "other data: weight 3/2 against 2"
+    assert judged(row(data=DATA), row(data=other, metrics=less))[1] == "different data: weight 3/2 → 2"
 
 
 def test_the_same_numbers_written_otherwise_are_the_same() -> None:
@@ -70,7 +70,7 @@ def test_data_in_one_report_only_are_incomparable(old: Data | None, new: Data | 
     who = "candidate" if old is None else "baseline"
     assert judged(row(data=old), row(data=new)) == (
         "incomparable",
-        f"only the {who} says of which top and start it is",
+        f"only the {who} contains its top and start",
     )
     assert judged(row(), row())[0] == "same"
 
@@ -79,7 +79,7 @@ def test_a_baseline_from_before_ensembles_named_their_start_is_compared_by_its_t
     older = replace(DATA, omega=(), gamma=())
     old, new = row(data=older, starts=16), row(data=DATA, starts=16)
     assert judged(old, new)[0] == judged(old, old)[0] == "same"
-    assert judged(new, old)[1].startswith("other data: omega 1/10, 0, 9/10 against none")
+    assert judged(new, old)[1].startswith("different data: omega 1/10, 0, 9/10 → none")
     assert judged(old, row(data=replace(DATA, weight="2"), starts=16))[0] == "incomparable"
 
 
@@ -90,7 +90,7 @@ def test_a_baseline_from_before_ensembles_named_their_start_is_compared_by_its_t
         (replace(DATA, centre=()), 1, "0 components of centre"),
         (replace(DATA, omega=(), gamma=()), 1, "0 components of omega"),
         (replace(DATA, gamma=("1", "0")), 16, "2 components of gamma"),
-        (replace(DATA, gamma=()), 16, "half a start"),
+        (replace(DATA, gamma=()), 16, "an incomplete start"),
         (replace(DATA, weight="much"), 1, "much"),
         (replace(DATA, weight="1/0"), 1, "divides by zero"),
         (replace(DATA, centre=("nan", "0", "0")), 16, "nan"),
@@ -123,7 +123,7 @@ def test_a_series_and_a_law_are_of_the_quantity_that_they_were(part: str) -> Non
         for quantity in (Quantity("drift", "energy"), Quantity("drift", "area"))
     ]
     assert judged(two[0], two[0])[0] == "same"
-    assert judged(*two) == ("incomparable", "it says that it is another quantity")
+    assert judged(*two) == ("incomparable", "it is declared as a different quantity")
 
 
 def own_top(centre: str, omega: str) -> str:
@@ -140,7 +140,7 @@ def test_two_tops_of_one_name_in_two_plans_are_two(tmp_path: Path) -> None:
 
     mine = ran("1/2", "9/10")
     assert judged(mine, ran("0.5", "0.90"))[0] == "same"
-    assert judged(mine, ran("1/3", "9/10")) == ("incomparable", "other data: centre 0, 0, 1/2 against 0, 0, 1/3")
+    assert judged(mine, ran("1/3", "9/10")) == ("incomparable", "different data: centre 0, 0, 1/2 → 0, 0, 1/3")
     assert judged(mine, ran("1/2", "4/5"))[0] == "incomparable"
 
 
@@ -175,4 +175,4 @@ def test_a_scored_trajectory_has_its_data(tmp_path: Path) -> None:
     assert two[0].data == data_of(case)
     assert judged(two[0], two[0])[0] == "same"
     for pair in (two, two[::-1]):
-        assert judged(*pair)[1].startswith("other data: weight")
+        assert judged(*pair)[1].startswith("different data: weight")

@@ -135,7 +135,7 @@ def test_a_baseline_whose_reruns_part_excuses_nothing_that_rounding_does_not_exp
 
 
 def test_a_candidate_whose_reruns_part_is_worse_where_it_reaches_further() -> None:
-    assert judged(one("1.6e-14", 0.3), one("1.6e-14", 7.1)) == ("worse", "noise: 7.1 decades, not 0.3")
+    assert judged(one("1.6e-14", 0.3), one("1.6e-14", 7.1)) == ("worse", "noise: 0.3 → 7.1 decades")
     assert all_judged(one("1e-3", 0.0), one("1e-14", 7.1), one("1e-14", 4.0)) == ["same", "better"]
 
 
@@ -234,7 +234,7 @@ def test_a_repair_is_not_worse_for_its_noise(name: str) -> None:
     # where value and band together exceed those of the baseline it is noisier
     assert judged(one("6.3e-12", 0.0022, name), one("6.2e-12", 0.47, name)) == (
         "worse",
-        "noise: 0.47 decades, not 0.0022",
+        "noise: 0.0022 → 0.47 decades",
     )
 
 
@@ -275,7 +275,7 @@ def test_where_all_digits_are_lost_a_narrow_band_is_chance() -> None:
     lost = Against("computed", "words", until="90")
     for reference, near, far in ((lost, 1.49, 1.51), (Against("computed", "words"), 0.24, 0.26)):
         said = {"reference": reference, "against": reference.text, "data": UPRIGHT}
-        old, name = one("0.5", 0.041, **said), "noise: {:.2g} decades, not 0.041"
+        old, name = one("0.5", 0.041, **said), "noise: 0.041 → {:.2g} decades"
         assert judged(old, one("0.5", near, **said))[0] == "same"
         assert judged(old, one("0.5", far, **said)) == ("worse", name.format(far))
 

@@ -20,7 +20,7 @@ MESSAGE = "message.txt"
 def require_baseline(baseline: Path, remedy: str) -> None:
     """Raise InputError if the folder has no report; remedy: the command that makes it."""
     if not any((baseline / name).exists() for name in (FILE, f"{FILE}.gz")):
-        raise InputError(f"{baseline} holds no baseline.", f"Make it, and commit it: {remedy}")
+        raise InputError(f"{baseline} contains no baseline.", f"Make one, and commit it: {remedy}")
 
 
 def clear(folder: Path) -> None:

@@ -39,7 +39,7 @@ _STEPS_MOVED = 0.02
 _LESS = 0.5
 """Largest loss at coarser settings, as a fraction of that at the finest, for a new error of lower order."""
 _LOWER_ORDER = (
-    "; coarser settings {}: the new error is of lower order than the method's, as of a coefficient or a "
+    "; coarser settings {}: the new error is of lower order than the method, as from a wrong coefficient or a "
     "stage in lower precision"
 )
 _MOST_HELD = 20_000
@@ -246,7 +246,7 @@ def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[s
     """
     if not changes.rows:
         counted = same - sum(row.outcome in UNMEASURED for row in failed)
-        numbers = f"{plural(counted, 'metric is', 'metrics are')} within what is allowed"
+        numbers = f"{plural(counted, 'metric is', 'metrics are')} within the limits"
         return [*([f"Nothing changed: {numbers}."] if counted else []), *_still_failed(failed), *_yardstick(changes)]
     orders = list(_orders(changes))
     ranked = [*_explained(changes), *(sentence for moved, sentence in orders if moved < 0)]
@@ -270,7 +270,7 @@ def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[s
             if (len(keys), len(changes.rows)) == (1, 2)
             else "Were they made with the same plan?"
         )
-        end = f"The two have no row in common. {advice}"
+        end = f"The reports have no row in common. {advice}"
     return [clip(text, _LONGEST) for text in (*(group.text for group in ranked), *still, end, *scale)]
 
 
@@ -280,7 +280,7 @@ def _yardstick(changes: Changes) -> list[str]:
         return []
     first = min(changes.yardstick, key=lambda change: RANK.index(change.verdict))
     rows = plural(len(changes.yardstick), "row")
-    return [f"heyoka, measured for scale and not judged, changed in {rows}{_on([first.identity])}: {line(first)}."]
+    return [f"heyoka, measured for scale but not judged, changed in {rows}{_on([first.identity])}: {line(first)}."]
 
 
 def _still_failed(rows: Sequence[Row]) -> list[str]:
@@ -495,7 +495,7 @@ def _digits_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Se
         others = len(changes) - 1
         more = f", {'fewer' if sign > 0 else 'more'} on {plural(others, 'other row')} too" if others else ""
         if worst.lost > _ENDS_AS_BEFORE and sign > 0 and all(_ends_as_before(change) for change in changes):
-            more += "; the last state is as it was: errors are between steps, of the dense output"
+            more += "; the last state is unchanged: the errors are between steps, in the dense output"
         yield Sentence(
             f"Digits right {old} → {new} on {_where(worst.identity)}{more}.", frozenset(c.identity for c in changes)
         )

@@ -61,7 +61,7 @@ class Allowance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         if self.loss_bits is not None and self.loss_digits is not None:
-            raise InputError("A policy gives both loss_bits and loss_digits.", "Give one of them.")
+            raise InputError("loss_bits and loss_digits were given.", "Give one of them.")
         for name in ("floor", "loss_bits", "loss_digits", "noise", "duration", "value"):
             if (value := getattr(self, name)) is not None:
                 _not_negative(name, value)
@@ -100,7 +100,7 @@ class Timings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.ratio) and self.ratio >= 1):
-            raise InputError(f"timings ratio = {self.ratio} is not 1 or more.", _REMEDY)
+            raise InputError(f"timings ratio must be at least 1; got {self.ratio}.", _REMEDY)
         _not_negative("timings floor", self.floor)
 
 
@@ -206,7 +206,7 @@ def _limits(rule: Rule, policy: Policy) -> Limits:
 def _not_negative(name: str, value: str | float) -> None:
     if physical(value, name) < 0:
         shown = f"{value:g}" if isinstance(value, float) else value
-        raise InputError(f"{name} = {shown} is negative.", "Give 0 or more.")
+        raise InputError(f"{name} must not be negative; got {shown}.", "Give 0 or more.")
 
 
 def glob(pattern: str) -> re.Pattern[str]:

@@ -111,11 +111,11 @@ def judge_law(old: Law, new: Law, noise: float = 0.0, rerun: bool = False) -> Ju
     if old.growth != new.growth:
         if "unresolved" not in (old.growth, new.growth) and not (rerun and _between_classes(old, new)):
             worse = _GROWTH.index(new.growth) > _GROWTH.index(old.growth)
-            return (Verdict.WORSE if worse else Verdict.BETTER), f"grows like {new.growth}, not {old.growth}"
+            return (Verdict.WORSE if worse else Verdict.BETTER), f"grows like {new.growth} (was {old.growth})"
         if "exponential" in (old.growth, new.growth) or None in (old.exponent, new.exponent):
             return Verdict.INCOMPARABLE, "the growth is resolved in one report only"
     if new.starts < old.starts:
-        return Verdict.INCOMPARABLE, f"{old.starts} starts against {new.starts}"
+        return Verdict.INCOMPARABLE, f"{old.starts} → {new.starts} starts"
     for judged in (_judge_exponents(old, new, rerun), _judge_bends(old, new, rerun)):
         if judged[0] is not Verdict.SAME:
             break
@@ -139,7 +139,7 @@ def _judge_exponents(old: Law, new: Law, rerun: bool) -> Judged:
         return _judge_intervals("exponent", interval_of(old), interval_of(new), new.exponent, rerun, _EXPONENT_GAP)
     (low, high), (new_low, new_high) = interval_of(old), interval_of(new)
     if new_low > high or new_high < low:
-        return Verdict.INCOMPARABLE, "another exponent, and no interval to tell noise from it"
+        return Verdict.INCOMPARABLE, "a different exponent, without an interval to judge it"
     return SAME
 
 
@@ -148,8 +148,8 @@ def _judge_bends(old: Law, new: Law, rerun: bool) -> Judged:
     if "unresolved" not in (old.growth, new.growth) or old.growth == new.growth:
         return SAME
     if old.bend is None or new.bend is None:
-        return Verdict.INCOMPARABLE, "the growth is resolved in one report only, and how it bends is not known of both"
-    return _judge_intervals("bend towards the end", old.bend, new.bend, sum(new.bend) / 2, rerun, _BEND_GAP)
+        return Verdict.INCOMPARABLE, "the growth is resolved in one report only, and its curvature is not known in both"
+    return _judge_intervals("curvature at the end", old.bend, new.bend, sum(new.bend) / 2, rerun, _BEND_GAP)
 
 
 def _judge_intervals(quantity: str, old: Interval, new: Interval, middle: float, rerun: bool, gap: float) -> Judged:
@@ -166,7 +166,7 @@ def _judge_intervals(quantity: str, old: Interval, new: Interval, middle: float,
     if old[0] - high > required:
         return Verdict.BETTER, f"a smaller {quantity}"
     if new_width > _WIDER * width:
-        return Verdict.WORSE, f"noise: the interval of the {quantity} is {new_width:.2g} wide, not {width:.2g}"
+        return Verdict.WORSE, f"noise: the interval of the {quantity} is {new_width:.2g} wide (was {width:.2g})"
     return SAME
 
 
@@ -174,12 +174,12 @@ def _judge_information(old: Law, new: Law, noise: float) -> Judged | None:
     """The verdict where the candidate's law loses detection power, span, or the time of the last digit; None else."""
     for name in ("first", "last", "detects"):
         if getattr(old, name) is not None and getattr(new, name) is None:
-            return Verdict.INCOMPARABLE, f"the law no longer says {name}"
+            return Verdict.INCOMPARABLE, f"the law no longer has {name}"
     spans = [log_of(law.first) - log_of(law.last) for law in (old, new)]
     if log_of(new.last) < log_of(old.last) - math.log10(_SPAN) or spans[1] > spans[0] + math.log10(_SPAN):
-        return Verdict.INCOMPARABLE, f"fitted from {new.first} to {new.last}, not from {old.first} to {old.last}"
+        return Verdict.INCOMPARABLE, f"fitted from {new.first} to {new.last} (was {old.first} to {old.last})"
     if log_of(new.detects) > log_of(old.detects) + max(_DETECTS, noise):
-        return Verdict.WORSE, f"detects a fault of {new.detects} a step, not of {old.detects}"
+        return Verdict.WORSE, f"smallest fault detected per step {old.detects} → {new.detects}"
     if "unresolved" in (old.growth, new.growth) and None in (old.lost_at, new.lost_at):
         return None  # an unresolved law is not extrapolated
     if "unresolved" not in (old.growth, new.growth) and old.growth != new.growth:
@@ -188,10 +188,10 @@ def _judge_information(old: Law, new: Law, noise: float) -> Judged | None:
         power = CLASSES.get(new.growth, math.inf)
         earlier = (math.inf if old.lost_at is None else log_of(old.lost_at)) - log_of(new.lost_at)
         if earlier > _LOST_AT + (noise / power if power else 0.0):
-            before = old.lost_at or "any"
-            return Verdict.WORSE, f"all significant digits are lost from t = {new.lost_at} on, not from {before}"
+            before = old.lost_at or "never"
+            return Verdict.WORSE, f"all significant digits are lost from t = {new.lost_at} on (was {before})"
     elif old.lost_at is not None:
-        return Verdict.INCOMPARABLE, "the law no longer says when all significant digits are lost"
+        return Verdict.INCOMPARABLE, "the law no longer predicts when all significant digits are lost"
     return None
 
 
@@ -211,12 +211,12 @@ def judge_series(old: Series, new: Series, allowed: float, floor: float, exactly
     of each value as a fraction of the largest.  floor: log10 below which all errors are the same.
     """
     if old.times != new.times and list(map(exact, old.times)) != list(map(exact, new.times)):
-        return Verdict.INCOMPARABLE, "other times"
+        return Verdict.INCOMPARABLE, "different times"
     before, after = old.values, new.values
     if not (_WORDS.isdisjoint(before) and _WORDS.isdisjoint(after)):
         pairs = list(zip(before, after, strict=True))
         if any(b == NAN and a not in _NOT_NUMBERS for a, b in pairs):
-            return Verdict.WORSE, "a value is no longer a number"
+            return Verdict.WORSE, "a value is no longer finite"
         if any(b == MISSING and a not in _NOT_NUMBERS for a, b in pairs):
             return Verdict.INCOMPARABLE, "a value is no longer measured"
         unresolved = sum(b == UNRESOLVED != a for a, b in pairs)
@@ -230,7 +230,7 @@ def judge_series(old: Series, new: Series, allowed: float, floor: float, exactly
         values = list(zip(map(exact, before), map(exact, after), strict=True))
         tolerance = Fraction(allowed) * max(abs(a) for a, _ in values)
         differs = any(abs(b - a) > tolerance for a, b in values)
-        return (Verdict.WORSE, "a value that must agree does not") if differs else SAME
+        return (Verdict.WORSE, "a value that must be equal differs") if differs else SAME
     sizes = [log_sizes(tuple(texts)) for texts in (before, after)]
     if max(sizes[1]) <= max(floor, min(sizes[0])):
         return SAME
@@ -242,7 +242,7 @@ def judge_series(old: Series, new: Series, allowed: float, floor: float, exactly
 
 _STEPS = 2
 """Factor: beyond this ratio of steps, or of evaluations of the field, the method must be another one."""
-_OTHER_QUANTITY: Judged = (Verdict.INCOMPARABLE, "it says that it is another quantity")
+_OTHER_QUANTITY: Judged = (Verdict.INCOMPARABLE, "it is declared as a different quantity")
 
 
 class Finding(msgspec.Struct, frozen=True, gc=False):
@@ -463,10 +463,10 @@ class RowComparison:
         if judged[0] is Verdict.SAME and metric.quantity != match.quantity:
             return _OTHER_QUANTITY
         if metric.band is not None and match.band is None and match.log10 is not None:
-            return Verdict.INCOMPARABLE, f"its noise is not measured, which was {metric.band:.2g} decades"
+            return Verdict.INCOMPARABLE, f"its noise is not measured (was {metric.band:.2g} decades)"
         wider = noisier(kind, metric, match, bool(old.reference.until))
         if wider and reaches_further(metric, match, least_of, limits.loss):
-            return Verdict.WORSE, f"noise: {match.band:.2g} decades, not {metric.band:.2g}"
+            return Verdict.WORSE, f"noise: {metric.band:.2g} → {match.band:.2g} decades"
         return judged
 
     def _laws(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
@@ -524,9 +524,9 @@ class RowComparison:
             yield Finding(key, "", Verdict.WORSE, "finite", "not finite", "a value is no longer finite")
         work = [(row.steps, row.order, row.evaluations) for row in (old, new)]
         if self.policy.flags != "ignore" and work[0] != work[1]:
-            method = [("other steps", old.steps, new.steps, _STEPS), ("another order", old.order, new.order, 1)]
+            method = [("different steps", old.steps, new.steps, _STEPS), ("different order", old.order, new.order, 1)]
             if old.evaluations is not None:
-                method.insert(1, ("other evaluations of the field", old.evaluations, new.evaluations, _STEPS))
+                method.insert(1, ("different evaluations of the field", old.evaluations, new.evaluations, _STEPS))
             for reason, before, after, factor in method:
                 few, many = sorted(-1 if count is None else count for count in (before, after))
                 if few * factor < many:
@@ -534,13 +534,13 @@ class RowComparison:
         fewer = _STEPS if kind_of(old, self.kinds).samples_are_steps else 1
         samples = _samples(new)
         if samples < -(-_samples(old) // fewer):
-            reason = "fewer samples: the largest of them is smaller"
+            reason = "fewer samples, so their maximum is smaller"
             yield Finding(key, "", Verdict.INCOMPARABLE, f"{_samples(old)} samples", f"{samples} samples", reason)
         rounded = old.input_rounding
         if rounded is not None and new.input_rounding != rounded:
             eps = exact(2) ** (1 - old.bits)
             if new.input_rounding is None or exact(new.input_rounding) > max(exact(rounded), eps):
-                reason = "the data were rounded by more"
+                reason = "the data were rounded more"
                 yield Finding(key, "", Verdict.INCOMPARABLE, rounded, new.input_rounding, reason)
 
     def _seconds(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
@@ -568,27 +568,27 @@ class RowComparison:
         if reason := self._inconsistent(old, new):
             return reason
         if old.horizon != new.horizon and exact(old.horizon) != exact(new.horizon):
-            return f"horizon {old.horizon} against {new.horizon}"
+            return f"horizon {old.horizon} → {new.horizon}"
         if old.bits != new.bits:
-            return f"{old.bits} bits against {new.bits}"
+            return f"{old.bits} → {new.bits} bits"
         if old.starts != new.starts:
-            return f"{old.starts} starts against {new.starts}"
+            return f"{old.starts} → {new.starts} starts"
         if reason := other_data(old.data, new.data) or other_request(old, new):
             return reason
         if (old.steps == 0) != (new.steps == 0):
-            return f"{old.steps} steps against {new.steps}"
+            return f"{old.steps} → {new.steps} steps"
         if old.flags != new.flags and self.policy.flags != "ignore":
             names = [n for n in sorted({*old.flags, *new.flags}) if old.flags.get(n) != new.flags.get(n)]
             return "flags differ: " + ", ".join(f"{n} {old.flags.get(n)} -> {new.flags.get(n)}" for n in names)
         if old.measured != new.measured:
-            return f"{old.measured or 'nothing'} is measured, and {new.measured or 'nothing'}"
+            return f"measured: {old.measured or 'nothing'} → {new.measured or 'nothing'}"
         return weaker(old.reference, new.reference)
 
     def _inconsistent(self, old: Row, new: Row) -> str:
         """The first contradiction within one of the rows; empty without any."""
         for row, which, checked in zip((old, new), ("baseline", "candidate"), self.checked, strict=True):
             if not checked and (problem := next(contradictions(row, kind_of(row, self.kinds)), "")):
-                return f"the {which} contradicts itself: {problem}"
+                return f"the {which} is inconsistent: {problem}"
         return ""
 
     def _eps(self, quantity: Quantity | None, row: Row) -> float:

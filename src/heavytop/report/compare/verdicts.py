@@ -75,7 +75,7 @@ def judge(
     error, in each row.  bound: the largest error that rounding explains; None where the noise band alone decides.
     """
     if old.kind != new.kind:
-        return Verdict.INCOMPARABLE, f"kind {old.kind} against {new.kind}"
+        return Verdict.INCOMPARABLE, f"kind {old.kind} → {new.kind}"
     if (judged := _not_numbers(old, new, limits)) is not None:
         return judged
     if old.kind == "error":
@@ -92,9 +92,9 @@ def _not_numbers(old: Metric, new: Metric, limits: Limits) -> Judged | None:
     """
     if MISSING not in (old.value, new.value) and old.value != new.value:
         if new.value == NAN:
-            return Verdict.WORSE, "no longer a number"
+            return Verdict.WORSE, "no longer finite"
         if old.value == NAN:
-            return beyond_limit(new, limits) or (Verdict.BETTER, "now a number")
+            return beyond_limit(new, limits) or (Verdict.BETTER, "now finite")
     for metric in (old, new):
         if metric.value in (NAN, MISSING) or (metric.value == UNRESOLVED and old.kind == "error" and not metric.bound):
             return Verdict.INCOMPARABLE, f"the value is {metric.value}"
@@ -134,7 +134,7 @@ def _errors(
     loss = b - a
     if abs(loss) <= allowed:
         return SAME
-    beyond = f", noise moves it by {noise / BITS:.1f} bits" if noise > limits.loss else ""
+    beyond = f"; its noise is {noise / BITS:.1f} bits" if noise > limits.loss else ""
     if loss > 0:
         return Verdict.WORSE, f"{loss / BITS:.1f} bits lost{beyond}"
     return Verdict.BETTER, f"{-loss / BITS:.1f} bits gained{beyond}"
@@ -160,7 +160,7 @@ def beyond_limit(new: Metric, limits: Limits) -> Judged | None:
     if size(new) <= limits.limit:
         return None
     if new.value == UNRESOLVED:
-        return Verdict.INCOMPARABLE, "limit not resolved"
+        return Verdict.INCOMPARABLE, "unresolved at its limit"
     return Verdict.WORSE, "above its limit"
 
 
@@ -192,7 +192,7 @@ def _values(old: Metric, new: Metric, limits: Limits) -> Judged:
     """Values must agree; neither direction is better."""
     if old.value == new.value:
         return SAME
-    differs = Verdict.WORSE, "a value that must agree does not"
+    differs = Verdict.WORSE, "a value that must be equal differs"
     if "never" in (old.value, new.value) or UNRESOLVED in (old.value, new.value):
         return differs
     a, b = exact(old.number), exact(new.number)
@@ -230,7 +230,7 @@ def judge_repeated(
     of the candidate is no excuse.
     """
     if missing := [name for name in ("run", "least", BAND) if name not in new]:
-        yield missing[0], (Verdict.INCOMPARABLE, "its runs are no longer repeated for a comparison")
+        yield missing[0], (Verdict.INCOMPARABLE, "its runs are no longer repeated")
         return
     if not all(math.isfinite(seconds) for seconds_of_rows in (old, new) for seconds in seconds_of_rows.values()):
         yield "run", (Verdict.INCOMPARABLE, "no finite time")
@@ -255,8 +255,8 @@ def _seconds_verdict(old: float, new: float, allowed: float) -> Judged:
     if abs(grown) <= allowed:
         return SAME
     if grown > 0:
-        return Verdict.WORSE, f"{10**grown:.3g} times as long, where {10**allowed:.2g} is allowed"
-    return Verdict.BETTER, f"{10**-grown:.3g} times as fast, where {10**allowed:.2g} is allowed"
+        return Verdict.WORSE, f"{10**grown:.3g} times as long; {10**allowed:.2g} is allowed"
+    return Verdict.BETTER, f"{10**-grown:.3g} times as fast; {10**allowed:.2g} is allowed"
 
 
 # Outcomes: the comparison of two rows of which at least one did not reach its horizon.
@@ -291,9 +291,9 @@ def judge_outcomes(old: Row, new: Row, duration: float) -> Judged | None:
     if before == SUCCESS:
         return (Verdict.INCOMPARABLE if after == NOT_ASKED else Verdict.WORSE), ended(new, "candidate")
     if after == SUCCESS:
-        return Verdict.BETTER, f"it reaches its horizon, and {ended(old, 'baseline')}"
+        return Verdict.BETTER, f"it reaches its horizon; {ended(old, 'baseline')}"
     if {before, after} <= _TOO_LONG:
-        return Verdict.SAME, "out of time in both reports"
+        return Verdict.SAME, "timed out in both reports"
     if before != after:
         return Verdict.INCOMPARABLE, f"{ended(old, 'baseline')}, {ended(new, 'candidate')}"
     if before == FAILED:
@@ -330,9 +330,9 @@ def weaker(old: Against, new: Against) -> str:
     if old == new:
         return ""
     if old.how != new.how:
-        return f"compared with {_reference_name(old)} and with {_reference_name(new)}"
+        return f"different references: {_reference_name(old)} → {_reference_name(new)}"
     if old.how == "equations" and old.method != new.method:
-        return f"compared with {old.method!r} and {new.method!r}"
+        return f"different references: {old.method!r} → {new.method!r}"
     proven = [a.how == "proven" and all(c.proven != "computed" for c in a.certificates) for a in (old, new)]
     if proven[0] and not proven[1]:
         return "the reference is no longer proven"
@@ -340,7 +340,7 @@ def weaker(old: Against, new: Against) -> str:
         return "the reference is valid until an earlier time"
     decades = _RADIUS_DECADES if old.how == "proven" else _COMPUTED_DECADES
     if old.radius and not (new.radius and log_of(new.radius) <= log_of(old.radius) + decades):
-        return "the radius of the reference is larger, or not said"
+        return "the radius of the reference is larger or missing"
     return _certified_less(old.certificates, new.certificates)
 
 
@@ -353,13 +353,13 @@ def _certified_less(old: Sequence[Certified], new: Sequence[Certified]) -> str:
             " and ".join("all" if math.isinf(digits) else str(digits) for digits in part) or "no"
             for part in (digits, after)
         )
-        return f"the reference is certified to {lacking} digits, not {stated}"
+        return f"the reference is certified to {lacking} digits (was {stated})"
     starts = [
         next((certificate.starts for certificate in part if certificate.starts is not None), None)
         for part in (old, new)
     ]
     if starts[0] is not None and (starts[1] or 0) < _TIME_KEPT * starts[0]:
-        return f"the reference is certified for {starts[1] or 'no'} starts, not {starts[0]}"
+        return f"the reference is certified for {starts[1] or 'no'} starts (was {starts[0]})"
     times, earlier = ([log_of(certificate.time) for certificate in part] for part in (old, new))
     if not _all_enough(times, earlier, lambda before, after: after >= before + math.log10(_TIME_KEPT)):
         return "the reference is certified at an earlier time"

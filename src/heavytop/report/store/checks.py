@@ -35,12 +35,12 @@ def other_data(old: Data | None, new: Data | None) -> str:
     if old == new:
         return ""
     if old is None or new is None:
-        return f"only the {'candidate' if old is None else 'baseline'} says of which top and start it is"
+        return f"only the {'candidate' if old is None else 'baseline'} contains its top and start"
     of_top, of_start = ("inertia", "weight", "centre", "rotor"), ("omega", "gamma")
     for name in of_top + of_start if old.omega else of_top:
         before, after = (getattr(data, name) for data in (old, new))
         if before != after and _numbers(before) != _numbers(after):
-            return f"other data: {name} {_text(before)} against {_text(after)}"
+            return f"different data: {name} {_text(before)} → {_text(after)}"
     return ""
 
 
@@ -51,12 +51,12 @@ def other_request(old: Row, new: Row) -> str:
     request.
     """
     if not old.request:
-        return "the baseline does not say which tops it surveys" if old.spread else ""
+        return "the baseline does not identify the tops of its survey" if old.spread else ""
     before, after = old.request, new.request or {}
     for name in sorted(before.keys() | after.keys()):
         expected, requested = (part.get(name) or "none" for part in (before, after))
         if expected != requested:
-            return f"another request: {name} {expected[:60]} against {requested[:60]}"
+            return f"different request: {name} {expected[:60]} → {requested[:60]}"
     return ""
 
 
@@ -68,7 +68,7 @@ def impossible(data: Data, starts: int) -> str:
         if count != 3 and (count or name in _VECTORS[:2] or (starts == 1 and name != "rotor")):
             return f"{count} components of {name}"
     if bool(data.omega) != bool(data.gamma):
-        return "half a start"
+        return "an incomplete start"
     try:
         _numbers((data.weight, *data.centre, *data.omega, *data.gamma, *data.rotor))
         positive = min(_numbers(data.inertia)) > 0
@@ -262,7 +262,7 @@ def law_text(law: Law) -> str:
 def inconsistent(law: Law) -> str:
     """The contradiction within a law, of its class, exponent, intervals and span; empty without one."""
     if (law.low is None) != (law.high is None) or (law.exponent is None and law.low is not None):
-        return "half an interval, or one without its exponent"
+        return "an incomplete interval, or one without an exponent"
     if law.first is not None and law.last is not None and exact(law.first) > exact(law.last):
         return f"a span from {law.first} to {law.last}"
     if law.exponent is None:
@@ -288,7 +288,7 @@ def interval_of(law: Law) -> Interval:
     return (law.exponent, law.exponent) if law.low is None or law.high is None else (law.low, law.high)
 
 
-REMEDY = "Make it again with `heavytop run`, or of a trajectory with `heavytop score FILE --out FOLDER`."
+REMEDY = "Write it again with `heavytop run`, or for a trajectory with `heavytop score FILE --out FOLDER`."
 
 
 def check_keys(file: Path | str, rows: Iterable[Row]) -> None:
@@ -296,7 +296,7 @@ def check_keys(file: Path | str, rows: Iterable[Row]) -> None:
     identities = set()
     for row in rows:
         if row.identity in identities:
-            raise InputError(f"{file} holds the row {printable(row_name(row.identity))[:60]} twice.", REMEDY)
+            raise InputError(f"{file} contains the row {printable(row_name(row.identity))[:60]} twice.", REMEDY)
         identities.add(row.identity)
 
 
@@ -343,7 +343,7 @@ def _of_fields(row: Row, kind: ReportedKind) -> Iterator[str]:
     if row.outcome not in _OUTCOMES:
         yield f"outcome: must be a known one; got {row.outcome[:60]!r}"
     if not row.bits and row.precision != "exact":
-        yield "bits: a format without any"
+        yield "bits: missing"
     if row.time_reached != row.horizon:
         reached, horizon = exact(row.time_reached), exact(row.horizon)
         # the time is rounded to the format, the horizon is not always

@@ -196,7 +196,7 @@ def _read(path: Path, kind: type[_Content]) -> tuple[Path, _Content]:
             if reports
             else REMEDY
         )
-        raise InputError(f"{str(file)[:_NAME]} holds no report: {why(error)}.", remedy) from None
+        raise InputError(f"{str(file)[:_NAME]} contains no report: {why(error)}.", remedy) from None
     if not content.lstrip().startswith(b"{"):
         remedy = f"`heavytop score {file}` reads a trajectory." if file.suffix == ".csv" else REMEDY
         raise InputError(f"{str(file)[:_NAME]} is not a whole report: it is not a JSON object.", remedy)
@@ -217,7 +217,7 @@ def _read(path: Path, kind: type[_Content]) -> tuple[Path, _Content]:
     if not unchanged:
         _check_repeats(file, content)
     if not isinstance(report.environment.get("packages", {}), dict):
-        raise InputError(f"{file} does not say which packages it was made with.", REMEDY)
+        raise InputError(f"{file} does not name the versions of its packages.", REMEDY)
     return file, replace_struct(report, plan=records.of_plan(report.plan))
 
 
