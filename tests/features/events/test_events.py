@@ -13,7 +13,7 @@ from flint import fmpq
 
 import heavytop as ht
 from heavytop.errors import InputError, OutOfReach
-from heavytop.features.events.functions import Wanted, event_function, rate_along, start_series
+from heavytop.features.events.functions import Wanted, event_function, first_term, rate_along, start_series
 from heavytop.features.events.located import locate
 from heavytop.integrate.dense import Dense, Piece
 from heavytop.integrate.trajectory import Problem
@@ -435,3 +435,14 @@ def test_records_without_events_keep_their_shapes(options) -> None:
         assert len(none) == 0
         assert none.to_numpy().shape == (0, 6)
         assert "0 events" in repr(none)
+
+
+@pytest.mark.parametrize(
+    ("function", "order"), [("gamma2**24 + (gamma1 - 3/5)**27", 24), ("(omega1 - 1/10)**31 + gamma2**27", 27)]
+)
+def test_a_function_that_vanishes_to_a_high_order_at_the_start_is_not_zero_along_the_motion(function, order) -> None:
+    top = ht.HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
+    start = ht.State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
+    found, value = first_term(event_function(function), HEAVY_TOP, HEAVY_TOP.parameters(top, start), start.flat)
+    assert found == order
+    assert value != 0

@@ -34,8 +34,8 @@ _REMEDY = (
     '"omega1*gamma2 - omega2*gamma1".'
 )
 _LONGEST, _DEEPEST, _HIGHEST, _MOST_TERMS = 1000, 100, 32, 2000
-_DERIVATIVES = 24
-"""A function whose derivatives along the motion vanish to this order at the start counts as zero along it."""
+_TERMS = 24
+"""Of a Taylor series at the start, which is asked for more where these vanish, of a polynomial of some degree."""
 _context = fmpq_mpoly_ctx.get(VARIABLES, Ordering.lex)
 
 
@@ -340,18 +340,22 @@ def rate_along(polynomial: Any, system: System, parameters: Parameters) -> Any:
 
 
 def start_series(
-    polynomials: Sequence[Any], system: System, parameters: Parameters, start: Sequence[Fraction]
+    polynomials: Sequence[Any],
+    system: System,
+    parameters: Parameters,
+    start: Sequence[Fraction],
+    terms: int = _TERMS,
 ) -> list[list[Fraction]]:
     """The Taylor coefficients of polynomials along the motion from an exact start, in powers of t, exactly."""
     from heavytop.exact.closed_form import taylor
     from heavytop.exact.flint.balls import coefficient, series_length
 
-    rows = taylor(system.field, parameters, start, _DERIVATIVES)
-    with series_length(_DERIVATIVES):
-        series = [fmpq_series([rational(v) for v in row], prec=_DERIVATIVES) for row in rows]
-        zero = fmpq_series([0], prec=_DERIVATIVES)
+    rows = taylor(system.field, parameters, start, terms)
+    with series_length(terms):
+        series = [fmpq_series([rational(v) for v in row], prec=terms) for row in rows]
+        zero = fmpq_series([0], prec=terms)
         along_motion = [composed(terms_of(polynomial), series, zero) for polynomial in polynomials]
-        coefficients = [[coefficient(series, n) for n in range(_DERIVATIVES)] for series in along_motion]
+        coefficients = [[coefficient(series, n) for n in range(terms)] for series in along_motion]
     return [[Fraction(int(c.p), int(c.q)) for c in row] for row in coefficients]
 
 
@@ -360,22 +364,29 @@ def first_term(
 ) -> tuple[int, Fraction]:
     """(order, coefficient) of the first term of the numerator along the motion from an exact start.
 
-    Raises InputError where the function is zero along the motion to order 24, or what it is divided by is.
+    Raises InputError where the function is zero along the motion as far as its series is followed, or what it is
+    divided by is.
     """
     from heavytop.exact.flint.balls import whole_evaluation
 
+    parts = function.numerator, function.square, function.denominator
+    terms = _TERMS
+
     @whole_evaluation
     def first() -> list[tuple[int, Fraction] | None]:
-        parts = function.numerator, function.square, function.denominator
-        series = start_series(parts, system, parameters, start)
+        series = start_series(parts, system, parameters, start, terms)
         return [next(((n, value) for n, value in enumerate(row) if value), None) for row in series]
 
     numerator, square, denominator = first()
+    if None in (numerator, square, denominator):
+        # a component leaves its value at the start as t, t^2 or, rarely, a little later
+        terms += 4 * max(part.total_degree() for part in parts)
+        numerator, square, denominator = first()
     if numerator is not None and square is not None and denominator is not None:
         return numerator
     fault = "is divided by 0" if denominator is None else "is zero"
     raise InputError(
-        f"The function {quoted(function.name)} {fault} along this motion: the first {_DERIVATIVES} derivatives at "
+        f"The function {quoted(function.name)} {fault} along this motion: the first {terms} terms of its series at "
         "t = 0 vanish.",
         "A change of sign needs a function that is defined and not zero all the time; choose another one.",
     )
