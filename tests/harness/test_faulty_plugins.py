@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import warnings
 from pathlib import Path
@@ -20,7 +21,7 @@ from support.reports import drift, plan_file, rows
 
 CASE = CASES["euler"]
 HEAD = """
-import os, sys, threading, warnings
+import os, signal, sys, threading, warnings
 import numpy
 from heavytop.integrate.peers.double import Solved
 
@@ -69,6 +70,7 @@ HARMLESS = (
     "warnings.warn('careful'); numpy.float64(1) / numpy.float64(0); return right(given)",
     "threading.Thread(target=len, args=('',)).start(); return right(given)",
     "os.chdir('/'); return right(given)",
+    "[signal.signal(each, signal.SIG_IGN) for each in (signal.SIGINT, signal.SIGTERM)]; return right(given)",
     "s = right(given); return Solved(numpy.array(s.states, numpy.float32), float('nan'), 10**30)",
 )
 TEARS = "[sys.modules.pop(name) for name in list(sys.modules) if name.startswith('heavytop')]\n"
@@ -98,13 +100,17 @@ def test_what_a_solver_does_is_an_error_in_words(line: str, tmp_path: Path) -> N
 def test_a_solver_that_is_only_rude_leaves_nothing_behind(
     line: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    before = os.getcwd(), numpy.geterr(), warnings.filters[:], sys.getrecursionlimit()
+    def state() -> tuple[object, ...]:
+        handlers = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+        return os.getcwd(), numpy.geterr(), warnings.filters[:], sys.getrecursionlimit(), handlers
+
+    before = state()
     text = SOLVE.format(line).replace("RIGHT", "Solved([[0.5] * 6] * 2, 2.0, 5)")
     try:
         assert propagated(tmp_path, text).outcome is ht.Outcome.SUCCESS
-        assert (os.getcwd(), numpy.geterr(), warnings.filters[:], sys.getrecursionlimit()) == before
+        assert state() == before
     finally:
-        os.chdir(before[0])
+        os.chdir(str(before[0]))
     assert capfd.readouterr() == ("", "")
 
 

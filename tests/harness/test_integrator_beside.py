@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+import heavytop as ht
 from heavytop.errors import InputError
 from heavytop.features.kinds import KINDS
 from heavytop.harness.checkpoint import Saved
@@ -79,6 +80,7 @@ def test_a_format_that_it_lacks_is_unsupported_and_no_failure(tmp_path: Path) ->
     assert (row.outcome, row.metrics) == ("unsupported", {})
     assert row.reference.reason.startswith("scipy:DOP853 does not support quad")
     assert not failed(row, KINDS)
+    assert ht.Report("heavytop-report/2", {}, {}, [row]).verdict == "complete"
 
 
 @pytest.mark.parametrize("integrator", ["multiword", "splitting:8"])

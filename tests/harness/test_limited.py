@@ -11,30 +11,24 @@ from dataclasses import replace
 from pathlib import Path
 from time import sleep
 
-import msgspec
 import pytest
 
 import heavytop as ht
-from heavytop.errors import InputError, NotAsked, OutOfTime
+from heavytop.errors import InputError
 from heavytop.features.kinds import KINDS
 from heavytop.guard import how_it_ended, stopwatch
-from heavytop.harness.checkpoint import Saved
 from heavytop.harness.limited import RowLimits
 from heavytop.harness.plan import read
-from heavytop.harness.rows import measure
-from heavytop.records import Row
-from heavytop.report.compare.noise import Policy
 from support.helpers import START, TOP, is_running, wait_until, without_progress
 from support.in_process import heavytop
 from support.midpoint import MIDPOINT
-from support.reports import all_good, compare, drift, failed_row, plan_file, rows
+from support.reports import all_good, drift, plan_file, rows
 
 PROGRAM = Path(__file__).parents[1] / "support" / "faulty_program.py"
 MODULE = """
 import os, re, subprocess, time
 from pathlib import Path
-from heavytop.integrate.peers.double import Solved, double_peer
-from heavytop.integrate.trajectory import Outcome
+from heavytop.integrate.peers.double import Solved
 
 def solve(given):
     assert given.step_limit == 10**7
@@ -58,14 +52,11 @@ def leaves(given):  # a forked process of another session, which holds the pipes
 
 def interrupts(given):
     raise KeyboardInterrupt
-
-forward = double_peer("forward", 2, solve, directions=["forward"], systems=["heavy_top"], precisions=["double"])
 """
 MODULE += MIDPOINT.format(name="midpoint")
 PLAN = """name = "faults"
 row_timeout = "2"
-integrators = ["mine.py:solve", "mine.py:sleeps", "mine.py:stuck", "mine.py:forward", "mine.py:leaves",
-    "mine.py:interrupts"]
+integrators = ["mine.py:solve", "mine.py:sleeps", "mine.py:stuck", "mine.py:leaves", "mine.py:interrupts"]
 [[integrator]]
 name = "silent"
 command = ["{python}", "{program}", "silent"]
@@ -76,10 +67,10 @@ setting = "step"
 """
 
 
-def plan(folder: Path, *names: str, precision: str = "double", cases: tuple[str, ...] = ("euler",)) -> Path:
+def plan(folder: Path, *names: str, cases: tuple[str, ...] = ("euler",)) -> Path:
     (folder / "mine.py").write_text(MODULE)
     head = PLAN.format(python=sys.executable, program=PROGRAM)
-    tables = [drift(*cases, integrator=name, runs=[(precision, "2", 4)]) for name in names]
+    tables = [drift(*cases, integrator=name, runs=[("double", "2", 4)]) for name in names]
     return Path(plan_file(folder, head + "".join(tables)))
 
 
@@ -133,32 +124,6 @@ def test_whatever_ends_a_run_ends_what_it_started(tmp_path: Path, end: int) -> N
     assert ("interrupted" in said) == (end == signal.SIGINT)
     assert gone(str(PROGRAM))
     assert gone("sleep", "987")
-
-
-@pytest.mark.slow
-def test_what_an_integrator_declares_that_it_cannot_do_is_no_failure(tmp_path: Path) -> None:
-    def measured(precision: str) -> ht.Report:
-        (task,) = read(str(plan(tmp_path, "mine.py:forward", precision=precision)), KINDS)[2]
-        return ht.Report("heavytop-report/2", {"name": "p"}, {}, [measure(KINDS["drift"], task, Saved())])
-
-    lacking, able = measured("quad"), measured("double")
-    assert [row.outcome for row in (*lacking.rows, *able.rows)] == ["unsupported", "success"]
-    assert all_good(lacking.rows)
-    assert lacking.verdict == "complete"
-    lost, gained = (ht.Report("heavytop-report/2", {}, {}, each.rows) for each in (lacking, able))
-    there = gained.rows[0]  # the same row in two versions
-    lost.rows[0] = msgspec.structs.replace(lost.rows[0], key=there.key, precision=there.precision)
-    for baseline, candidate, verdict, code in (
-        (lost, lost, "same", 0),
-        (gained, lost, "worse", 1),
-        (lost, gained, "better", 0),
-    ):
-        found = compare(baseline, candidate, Policy())
-        assert (found.verdict, found.exit_code) == (verdict, code)
-        assert compare(baseline, candidate, Policy(), list_same=False).verdict == verdict
-    failed = ht.Report("heavytop-report/2", {}, {}, [msgspec.structs.replace(lost.rows[0], outcome="failed")])
-    for pair in ((failed, lost), (lost, failed)):
-        assert compare(*pair, Policy()).exit_code == 3
 
 
 def test_an_end_is_named_by_its_signal_or_its_exit_code() -> None:
@@ -263,21 +228,6 @@ def test_an_integrator_that_ran_out_of_time_twice_is_not_asked_a_third_time(tmp_
     (said, *_) = [row.reference.reason for row in found.values() if row.outcome == "not_asked"]
     assert said.startswith("mine.py:sleeps ran out of time in 2 other rows and was not asked again, in ")
     assert not all_good(list(found.values()))
-
-
-def test_what_was_not_asked_is_no_number_and_the_same_as_what_ran_out_of_time(tmp_path: Path) -> None:
-    (task,) = read(str(plan(tmp_path, "mine.py:solve")), KINDS)[2]
-    good = measure(KINDS["drift"], task, Saved())
-    late, unasked = (failed_row(task, "slow", kind) for kind in (OutOfTime, NotAsked))
-
-    def verdict(old: Row, new: Row) -> int:
-        reports = (ht.Report("heavytop-report/2", {}, {}, [each]) for each in (old, new))
-        return compare(*reports, Policy()).exit_code
-
-    assert {verdict(old, new) for old in (late, unasked) for new in (late, unasked)} == {0}
-    assert verdict(good, late) == 1
-    assert verdict(good, unasked) == 3
-    assert verdict(unasked, good) == 0
 
 
 @pytest.mark.slow

@@ -24,7 +24,8 @@ from heavytop.integrate import registry
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.peers import command as commands
 from heavytop.integrate.peers.command import Command, number_text
-from heavytop.integrate.registry import commands_in, named
+from heavytop.integrate.peers.double import double_peer
+from heavytop.integrate.registry import commands_in, named, of_callable
 from heavytop.precision import exact, number
 from heavytop.written_numbers import number as written
 from support.helpers import judged
@@ -215,13 +216,16 @@ def test_one_process_serves_many_requests_and_the_next_row_begins_with_an_empty_
 def test_what_a_program_declares_that_it_cannot_do_is_never_sent() -> None:
     forward = program("dies at the start", directions=("forward",), precisions=("double", "real:BITS"))
     integrate = registry.ready(forward)
-    for options, what in (
-        (([Fraction(-1)], DOUBLE), "direction backward"),
-        (([Fraction(1)], QUAD), "format quad"),
-        (([Fraction(1)], EXTENDED), "format extended"),
+    peer = of_callable(double_peer("rk4", 4, print, directions=["forward"], precisions=["double"]))
+    for which, options, what in (
+        (integrate, ([Fraction(-1)], DOUBLE), "direction backward"),
+        (registry.ready(peer), ([Fraction(-1)], DOUBLE), "direction backward"),
+        (registry.ready(peer), ([Fraction(1)], QUAD), "format quad"),
+        (integrate, ([Fraction(1)], QUAD), "format quad"),
+        (integrate, ([Fraction(1)], EXTENDED), "format extended"),
     ):
         with pytest.raises(Unsupported, match=what):
-            integrate(CASE.top, CASE.start, *options)
+            which(CASE.top, CASE.start, *options)
     gyrostat = CASES["gyrostat"]
     with pytest.raises(Unsupported, match="system gyrostat"):
         integrate(gyrostat.top, gyrostat.start, TIMES, DOUBLE, system=GYROSTAT)

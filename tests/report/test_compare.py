@@ -129,6 +129,20 @@ def test_what_is_not_measured_for_another_reason_proves_no_failure(outcome: str)
             assert compare(*map(report, pair), Policy()).exit_code == 3
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "code"),
+    [
+        *((old, new, 0) for old in ("out_of_time", "not_asked") for new in ("out_of_time", "not_asked")),
+        *(("unsupported", new, code) for new, code in (("unsupported", 0), ("success", 0), ("failed", 3))),
+        *(("success", new, code) for new, code in (("unsupported", 1), ("not_asked", 3))),
+        ("not_asked", "success", 0),
+    ],
+)
+def test_what_was_not_asked_and_what_is_not_supported_are_no_failures(old: str, new: str, code: int) -> None:
+    two = (row() if outcome == "success" else ended(outcome) for outcome in (old, new))
+    assert compare(*map(report, two), Policy()).exit_code == code
+
+
 def test_two_failures_of_different_kinds_are_incomparable() -> None:
     for pair in (("failed", "out_of_time"), ("non_finite", "failed"), ("step_limit", "non_finite")):
         for old, new in (pair, pair[::-1]):
