@@ -110,20 +110,6 @@ def test_a_restart_that_its_error_does_not_explain_is_violated() -> None:
     assert (found.verdict, "times the error without it" in found.text) == ("violated", True)
 
 
-def test_what_draws_its_numbers_is_judged_within_its_error() -> None:
-    """A probabilistic solver moves a top at rest, and begins anew with another uncertainty."""
-
-    def solve(given):
-        found = memory.solver(memory.METHODS["ab2"][0])(given)
-        drawn = [1e-6 * ((17 * i) % 7 - 3) for i in range(6)]
-        return replace(found, states=[[a + b for a, b in zip(y, drawn, strict=True)] for y in found.states])
-
-    drawing = of_callable(double_peer("drawn", 2, solve, "step", one_step=False))
-    assert judged(drawing, "restart").verdict == "kept"
-    rest = judged(drawing, "rest")
-    assert (rest.verdict, "its error on a motion explains" in rest.text) == ("note", True)
-
-
 def test_what_keeps_a_memory_under_a_tolerance_has_no_single_steps() -> None:
     solve = memory.solver(memory.METHODS["ab4"][0])
     peer = of_callable(double_peer("adaptive", 4, lambda given: solve(replace(given, setting=0.01)), one_step=False))

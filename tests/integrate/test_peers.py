@@ -35,20 +35,12 @@ def test_odefun_and_heyoka_agree_to_the_format(name: str, precision) -> None:
 
 
 @pytest.mark.slow
-def test_a_run_that_gives_up_says_where(capfd) -> None:
+def test_a_run_that_gives_up_before_its_only_time_has_no_state(capfd) -> None:
     pytest.importorskip("sksundae")
-    case = CASES["lagrange"]
-    times = [Fraction(5), Fraction(10), Fraction(20)]
-    finer = ("tolerance", Fraction(1, 10**16))
-    run = run_peer("sundials:CVODE", case.top, case.start, times, setting=finer)
-    assert run.outcome is Outcome.STEP_TOO_SMALL
-    assert run.times == (5,)
-    assert len(run.states) == 1
+    case, finer = CASES["lagrange"], ("tolerance", Fraction(1, 10**16))
+    run = run_peer("sundials:CVODE", case.top, case.start, [Fraction(20)], setting=finer)
+    assert (run.outcome, len(run.states)) == (Outcome.STEP_TOO_SMALL, 0)
     assert 5 < run.time_reached < 10
-    alone = run_peer("sundials:CVODE", case.top, case.start, times[-1:], setting=finer)
-    assert alone.outcome is Outcome.STEP_TOO_SMALL
-    assert len(alone.states) == 0
-    assert 5 < alone.time_reached < 10
     assert capfd.readouterr() == ("", "")
 
 

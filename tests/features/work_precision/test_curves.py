@@ -122,10 +122,6 @@ def test_no_two_of_many_curves_look_alike() -> None:
     assert len(looks) == len(curves) == 17
 
 
-def test_an_error_that_nobody_reaches_makes_no_lead() -> None:
-    assert leads([OURS[0], CYRK[0]]) == []
-
-
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
@@ -261,17 +257,6 @@ def test_every_picture_is_a_file_as_svg_and_as_pdf(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no row that is drawn"):
         draw_report(report(), tmp_path / "none", KINDS)
     assert not (tmp_path / "none").exists()
-
-
-def test_without_such_rows_there_is_no_picture() -> None:
-    assert work_precision([("", report())]) is None
-    assert leads([]) == []
-
-
-def test_a_hostile_name_is_text() -> None:
-    rows = [row("<script>alert(1)</script>:x$ tolerance=1", -3, 1.0, case='<b>"&$_{$')]
-    assert "<script" not in drawn(rows).svg
-    assert "<b>" not in drawn(rows).svg
 
 
 def test_one_beside_heyoka_is_a_table_with_a_line_a_rung() -> None:

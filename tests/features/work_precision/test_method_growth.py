@@ -1,16 +1,12 @@
 """The law of growth of each method, on series whose laws are known and on runs."""
 
-import math
-
 import numpy
 import pytest
 
 from heavytop.features.work_precision.charts import alike, method_growth, trend
 from heavytop.records import Series
-from heavytop.report.compare.noise import Policy
 from heavytop.report.document.svg import quiet_style
-from support.report_helpers import GROWTH, HOSTILE, LONG, WORK, law, method
-from support.reports import compare, comparison_page
+from support.report_helpers import GROWTH, LONG, WORK, law, method
 from support.small_reports import report
 
 pytestmark = pytest.mark.pictures
@@ -110,25 +106,6 @@ def test_the_section_says_each_law_to_eye_and_ear() -> None:
     assert len(section.rows) == 6
     assert [*section.legend][-1] == "fitted power of t"
     assert "lagrange/T=10000" in section.text[0]
-
-
-def test_the_curves_are_the_series() -> None:
-    section = method_growth([("", report(*GROWTH))])
-    drawn = section.pictures[0].axes.get_lines()[0]
-    assert list(drawn.get_ydata()) == pytest.approx(
-        [math.log10(float(v)) for v in GROWTH[0].series["drift_energy"].values]
-    )
-
-
-@pytest.mark.slow
-def test_a_comparison_draws_both_and_a_hostile_case_is_text() -> None:
-    rows = [method(r.integrator, *r.series.values(), case=HOSTILE) for r in GROWTH]
-    made = report(*rows)
-    section = method_growth([("baseline", made), ("candidate", made)])
-    assert [key.old for key in section.legend.values()] == [True] * 3 + [False] * 4
-    page = comparison_page(made, made, compare(made, made, Policy()))
-    assert "method-growth" in page
-    assert "<script" not in page
 
 
 def test_methods_that_cannot_be_fitted_are_drawn_without_a_law() -> None:

@@ -11,7 +11,6 @@ from heavytop.errors import InputError
 from heavytop.exact.catalogue import find
 from heavytop.exact.flint.balls import midpoint
 from heavytop.features.work_precision import kind as work_precision
-from heavytop.features.work_precision.charts import trend
 from heavytop.features.work_precision.curves import panels
 from heavytop.integrate.peers.scipy_ivp import dop853
 from heavytop.integrate.trajectory import Problem
@@ -87,19 +86,6 @@ def test_the_way_back_of_a_symmetric_method_says_nothing_about_its_error(tmp_pat
     assert error(splitting, "error_max") > 1e-6
     assert error(splitting, "return_error") < 1e-12
     assert error(lsoda, "error_max") / 100 < error(lsoda, "return_error") < error(lsoda, "error_max") * 100
-
-
-@pytest.mark.slow
-def test_a_splitting_bounds_the_energy_and_its_phase_grows_more_slowly(tmp_path: Path) -> None:
-    ladders = [
-        '{ integrator = "heyoka", tolerances = ["1e-9"] }',
-        '{ integrator = "splitting:4", steps = ["1/40"] }',
-    ]
-    powers = [
-        [trend(row.series[name]).exponent for name in ("drift_energy", "solution_error_along")]
-        for row in rows(tmp_path, "lagrange", "3000", *ladders, samples=150)
-    ]
-    assert powers == [pytest.approx([1, 2], abs=0.25), pytest.approx([0, 1], abs=0.25)]
 
 
 def test_a_run_that_gives_up_is_a_failure_and_no_point(tmp_path: Path) -> None:
