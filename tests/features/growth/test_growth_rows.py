@@ -119,12 +119,6 @@ def test_integrals_walk_and_the_phase_grows_faster(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_same_task_gives_the_same_row(tmp_path: Path) -> None:
-    one, two = (row(tmp_path, "euler", 'horizon = "50", starts = 9, decades = 3') for _ in range(2))
-    assert msgspec.structs.replace(one, seconds={}) == msgspec.structs.replace(two, seconds={})
-
-
-@pytest.mark.slow
 def test_other_roundings_of_the_same_starts_are_the_same_law_and_no_alarm(tmp_path: Path) -> None:
     text = 'horizon = "2e3", starts = 16'
     (task,) = tasks(tmp_path, '"lagrange"', f'precision = "double", {text}')

@@ -259,6 +259,12 @@ def test_every_picture_is_a_file_as_svg_and_as_pdf(tmp_path: Path) -> None:
     assert not (tmp_path / "none").exists()
 
 
+def test_a_hostile_name_is_text() -> None:
+    rows = [row("<script>alert(1)</script>:x$ tolerance=1", -3, 1.0, case='<b>"&$_{$')]
+    assert "<script" not in drawn(rows).svg
+    assert "<b>" not in drawn(rows).svg
+
+
 def test_one_beside_heyoka_is_a_table_with_a_line_a_rung() -> None:
     mine = [row("mine:rk4 step=1/10", -4, 0.0123), row("mine:rk4 step=1/30", -9.7, 123.4)]
     mine += [row("mine:rk4 step=1/30", -13, 2.0, case="b/T=1"), row("heyoka tolerance=eps", -12, 0.5, case="b/T=1")]
