@@ -4,10 +4,12 @@ import json
 import time
 import tomllib
 from importlib.resources import files
+from pathlib import Path
 
 import pytest
 
 from heavytop.errors import InputError
+from heavytop.features.claims.audit.audit import read_claim
 from heavytop.features.claims.audit.guard import in_time
 from heavytop.features.claims.audit.judge import Audit
 from support.claim_tables import audited
@@ -129,3 +131,9 @@ def test_the_command_prints_the_json_that_scripts_read():
     text = heavytop("audit", EXAMPLES / "lagrange-wrong-sign.toml").stdout
     assert "Witnesses" in text
     assert "(1.1) 1" in text
+
+
+def test_a_file_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
+    claim = tmp_path / "claim.toml"
+    claim.write_bytes(b"\xef\xbb\xbf" + (EXAMPLES / "kovalevskaya-integral.toml").read_bytes())
+    assert read_claim(claim).name == "kovalevskaya-integral"

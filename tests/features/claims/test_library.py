@@ -136,6 +136,13 @@ def test_a_verdict_is_kept_for_the_same_entry_alone(folder: Path, monkeypatch: p
     assert len(calls) == 5
 
 
+def test_an_audit_that_was_stopped_is_tried_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for reason, verdict in (("It took longer than 60 s.", "undecided"), ("", "holds"), ("not called", "holds")):
+        judged = auditing.Judged(verdict, 1.0, reason)
+        monkeypatch.setattr(auditing, "audited", lambda entry, judged=judged: (judged, None))
+        assert ht.claim_library().verdicts[HEAD["id"]].verdict == verdict
+
+
 @pytest.mark.parametrize(
     ("change", "cause"),
     [

@@ -96,9 +96,11 @@ def claims(
 
 def _listed(tag: str | None, anew: bool) -> Any:
     from heavytop.features.claims.api import claim_library
-    from heavytop.features.claims.library.entry import library
+    from heavytop.features.claims.library.entry import library, require_tag
 
-    with counted("audits", len(library()), "claims", _ENTRY_SECONDS) as advance:
+    chosen = None if tag is None else require_tag(tag)
+    count = sum(chosen in (None, *entry.tags) for entry in library().values())
+    with counted("audits", count, "claims", _ENTRY_SECONDS) as advance:
         return claim_library(tag, anew=anew, done=advance)
 
 

@@ -224,10 +224,11 @@ def judged(
         judged = None if anew else _cached_verdict(entry)
         if judged is None:
             judged, _ = audited(entry)
-            with suppress(OSError, InputError):  # without a cache that can be written
-                path = _cache_file(entry)
-                path.parent.mkdir(parents=True, exist_ok=True)
-                files.replace(path, msgspec.json.encode(judged))
+            if not judged.reason:  # an audit that was stopped may end another time
+                with suppress(OSError, InputError):  # without a cache that can be written
+                    path = _cache_file(entry)
+                    path.parent.mkdir(parents=True, exist_ok=True)
+                    files.replace(path, msgspec.json.encode(judged))
         done()
         return judged
 
