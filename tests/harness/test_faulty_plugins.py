@@ -59,9 +59,9 @@ IN_SOLVE = {
     "return Solved(numpy.zeros((6, 2)), 2.0, 5)": "of the shape (6, 2) for 2 times",
     "return Solved(right(given).states[:1], 2.0, 5)": "returned 1 of 2 states",
     "return Solved(numpy.ones((2, 6), bool), 2.0, 5)": "returned states of bool",
-    "return Solved(right(given).states, 2.0, None)": "returned steps that are no count",
+    "return Solved(right(given).states, 2.0, None)": "returned steps that are not a count",
     "return Solved(right(given).states, 2.0, -5)": "returned a negative count of steps",
-    "return Solved(right(given).states, 2.0, 10.5)": "returned steps that are no count",
+    "return Solved(right(given).states, 2.0, 10.5)": "returned steps that are not a count",
 }
 HARMLESS = (
     "given.start[:] = 0; given.times[:] *= 2; given = None; return RIGHT",

@@ -173,7 +173,7 @@ def test_a_time_limit_that_is_none_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "cause"),
     [
-        ('name = "silent"', 'name = "forks"', "one name to two integrators"),
+        ('name = "silent"', 'name = "forks"', "two integrators the same name"),
         ('name = "silent"', 'name = "words"', "built-in"),
         ('"mine.py:solve"', '"mine"', "integrators must name files"),
         ('"mine.py:solve"', '"absent.toml"', "cannot be read"),
@@ -226,7 +226,7 @@ def test_an_integrator_that_ran_out_of_time_twice_is_not_asked_a_third_time(tmp_
     assert 0 <= under_way < 2
     assert outcomes == ["not_asked"] * (2 - under_way) + ["out_of_time"] * (2 + under_way)
     (said, *_) = [row.reference.reason for row in found.values() if row.outcome == "not_asked"]
-    assert said.startswith("mine.py:sleeps ran out of time in 2 other rows and was not asked again, in ")
+    assert said.startswith("mine.py:sleeps ran out of time in 2 other rows and was skipped, in ")
     assert not all_good(list(found.values()))
 
 

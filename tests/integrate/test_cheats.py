@@ -208,7 +208,7 @@ CHEATS = {
         "ended two equal calls as success at t = 20 in ",
     ),
     "sometimes": (None, "raised ValueError: not today"),
-    "no_step": ("changed(steps=lambda found: 0)", "counts its steps wrongly: it moved, and says that it took no step"),
+    "no_step": ("changed(steps=lambda found: 0)", "counts its steps wrongly: it moved, but reports 0 steps"),
     "fixed_few": ('double_peer("mine:fixed_few", 2, _fixed(1 / 50), "step")', "where each is 0.01"),
     "field_of_its_own": (None, "changed the field of the system heavy_top"),
 }

@@ -100,8 +100,8 @@ def law_row(growth: str, integrator: str = "mine:rk4", **laws: str) -> Row:
 @pytest.mark.parametrize(
     ("growth", "words"),
     [
-        ("t^1.5", "grows like t^1.5: rounding noise alone, the least there is."),
-        ("t", "grows like t: a frequency that is off by a constant, by truncation or a wrong coefficient."),
+        ("t^1.5", "grows like t^1.5: rounding noise alone, the smallest possible."),
+        ("t", "grows like t: a constant frequency error, from truncation or a wrong coefficient."),
         ("bounded", "is bounded."),
         ("unresolved", "follows no single law, over the last decade of t like t^1.7."),
     ],

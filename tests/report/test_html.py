@@ -469,7 +469,7 @@ def test_work_without_heyoka_opens_with_the_least_error() -> None:
         for size in ("1e-3", "2e-6")
     ]
     rows = [replace(each, seconds={"least": 0.25}) for each in rows]
-    assert headline_of("work_precision", rows) == "The least error is 2e-6: mine:rk on euler, in 250 ms."
+    assert headline_of("work_precision", rows) == "The smallest error is 2e-6: mine:rk on euler, in 250 ms."
 
 
 def test_one_chart_a_case_and_quantity_has_all_variants_with_their_laws() -> None:

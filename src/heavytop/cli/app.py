@@ -65,7 +65,7 @@ def _common(
     """Options before a command."""
 
 
-Json = Annotated[bool, typer.Option("--json", help="One JSON document on standard output and nothing else there.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 
 
 def plans(begun: str) -> list[str]:

@@ -25,11 +25,11 @@ def gate(
     integrator: Annotated[str, typer.Option(help="As for `run`: a name, mine.toml, mine.py:solve.")] = "",
     baseline: Annotated[Path, typer.Option(help="Folder of the trusted report.")] = Path(".heavytop/baseline"),
     policy: Annotated[Path | None, typer.Option(help="As for `compare`; policy.toml beside the plan if any.")] = None,
-    out: Annotated[Path, typer.Option(help="Folder of the new report; a former one there is replaced.")] = Path(
+    out: Annotated[Path, typer.Option(help="Folder of the new report; an earlier one is replaced.")] = Path(
         ".heavytop/new"
     ),
     bless: Annotated[bool, typer.Option("--bless", help="Make the new report the baseline.")] = False,
-    workers: Annotated[int | None, typer.Option(help="Local processes; as many as there are processors.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Local processes; default: the number of processors.")] = None,
     markdown: Annotated[Path | None, typer.Option(help="Write what changed as Markdown.")] = None,
     junit: Annotated[Path | None, typer.Option(help="Write what changed as JUnit XML.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a page that draws both on the same axes.")] = None,

@@ -159,7 +159,7 @@ def _one_case(name: str, json: bool) -> int:
 
 @command
 def selftest(
-    workers: Annotated[int | None, typer.Option(help="Local processes; as many as there are processors.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Local processes; default: the number of processors.")] = None,
     json: Json = False,
 ) -> int:
     """Try the detectors on integrators with planted faults.

@@ -90,31 +90,31 @@ _DATA = {
     "centre": _given("Centre of mass a,b,c."),
     "omega": _given("Angular velocity x,y,z at t = 0, in body axes."),
     "gamma": _given("x,y,z at t = 0: unit vector pointing vertically up, in body axes."),
-    "mass": _given("In place of --weight: the mass, of a body in any axes."),
+    "mass": _given("Mass, in place of --weight, of a body in any axes."),
     "gravity": _given("With --mass: the acceleration of gravity, such as 9.81, or 0."),
-    "about": _given("With --mass: what --inertia is about, 'pivot' or 'centre of mass'."),
+    "about": _given("With --mass: reference point of --inertia, 'pivot' or 'centre of mass'."),
     "omega_space": _given("Angular velocity at t = 0 in space axes; needs an attitude."),
     "quaternion": _given("Attitude w,x,y,z at t = 0, body to space."),
     "euler": _given("Attitude as ZXZ:a,b,c or another sequence; radians, or 30deg."),
     "matrix": _given("Attitude R row by row, 9 numbers: v_space = R v_body."),
     "axis_angle": _given("Attitude as x,y,z:angle; radians, or 30deg."),
     "rotor": _given("Momentum k1,k2,k3 of a rotor: the system is heavy_gyrostat."),
-    "file": _given("Body of a URDF, MJCF, SDF, USD or TOML file, free axes.", "--file", metavar="FILE"),
-    "link": _given("Link or body of --file, where it has several."),
+    "file": _given("Body in a URDF, MJCF, SDF, USD or TOML file.", "--file", metavar="FILE"),
+    "link": _given("Link or body in --file, if it has several."),
 }
 """Options of body and start by the keys of a plan."""
 _WHICH = _DATA | {
     "case": _given("A case of `heavytop list` in place of body and start.", "--case"),
-    "system": _given("heavy_top, gyrostat or heavy_gyrostat; without it heavy_top, or heavy_gyrostat with --rotor."),
-    "normalize": _given("Move gamma, quaternion or matrix to length 1 first.", "--normalize", kind=bool),
+    "system": _given("heavy_top, gyrostat or heavy_gyrostat; default: heavy_top, or heavy_gyrostat with --rotor."),
+    "normalize": _given("Normalize gamma, quaternion or matrix first.", "--normalize", kind=bool),
 }
 _WHERE = {
     "show": _given("Also quaternion, matrix, euler:ZXZ (any sequence), position, omega-space.", metavar="WHAT"),
     "point": _given("Body point x,y,z of --show position, in place of the centre of mass."),
-    "pivot": _given("Place x,y,z of the fixed point in space, 0,0,0 without it."),
+    "pivot": _given("Position x,y,z of the fixed point in space; default: 0,0,0."),
     "csv": _given("Write the table as CSV, which `score` reads.", kind=Path, metavar="FILE"),
     "latex": _given("Write it as LaTeX (siunitx, booktabs); print it without FILE.", kind=Path, metavar="[FILE]"),
-    "bibtex": _given("Write how to cite it as BibTeX; print it without FILE.", kind=Path, metavar="[FILE]"),
+    "bibtex": _given("Write a citation as BibTeX; print it without FILE.", kind=Path, metavar="[FILE]"),
     "json": Json,
 }
 _SHARED = _WHICH | _WHERE
@@ -239,9 +239,13 @@ def propagate(
         str, typer.Option(help="double, extended, double-double (of multiword), quad, real:BITS.")
     ] = "double",
     integrator: Annotated[str, typer.Option(help="One of `heavytop list`, mine.toml or mine.py:solve.")] = "heyoka",
-    attitude: Annotated[bool, typer.Option("--attitude", help="Carry the attitude; give Euler angles.")] = False,
-    tolerance: Annotated[str | None, typer.Option(help="Of the integrator; the eps of the format without it.")] = None,
-    step: Annotated[str | None, typer.Option(help="Of fixed steps, as of splitting:4; 1/100 without it.")] = None,
+    attitude: Annotated[bool, typer.Option("--attitude", help="Propagate the attitude; print Euler angles.")] = False,
+    tolerance: Annotated[
+        str | None, typer.Option(help="Tolerance of the integrator; default: eps of the format.")
+    ] = None,
+    step: Annotated[
+        str | None, typer.Option(help="Step size of fixed-step integrators (splitting:4); default: 1/100.")
+    ] = None,
     max_steps: Annotated[int | None, typer.Option(help="Stop after that many steps.")] = None,
 ) -> int:
     """Integrate one motion and print its states.
@@ -283,11 +287,9 @@ def reference(
     digits: Annotated[int, typer.Option(help="Proven digits, 1 to 20000.")] = 50,
     attitude: Annotated[bool, typer.Option("--attitude", help="Also xi, horizontal and fixed in space.")] = False,
     derivatives: Annotated[
-        str | None, typer.Option(help="Derivatives too: start, data (I1..I3, n = P r) or all.", metavar="WHICH")
+        str | None, typer.Option(help="Also derivatives by start, data (I1..I3, n = P r) or all.", metavar="WHICH")
     ] = None,
-    effort: Annotated[
-        str, typer.Option(help="Seconds that an enclosure may take, by its model of the cost.", metavar="SECONDS")
-    ] = "900",
+    effort: Annotated[str, typer.Option(help="Largest estimated time of an enclosure.", metavar="SECONDS")] = "900",
 ) -> int:
     """Print proven states of one motion.
 

@@ -39,10 +39,10 @@ def compare(
     baseline: Annotated[Path, typer.Argument(help="Report or its folder.")],
     candidate: Annotated[Path, typer.Argument(help="Report or its folder.")],
     policy: Annotated[
-        Path | None, typer.Option(help="TOML file of what counts as the same: `heavytop docs compare`.")
+        Path | None, typer.Option(help="TOML file of allowed differences: `heavytop docs compare`.")
     ] = None,
     floor: Annotated[str | None, typer.Option(help="Errors below FLOOR eps count as equal (4).")] = None,
-    loss: Annotated[str | None, typer.Option(help="Bits that errors may grow by (2; 10 % for truncation).")] = None,
+    loss: Annotated[str | None, typer.Option(help="Bits by which errors may grow (2; 10 % for truncation).")] = None,
     markdown: Annotated[Path | None, typer.Option(help="Write what changed as Markdown.")] = None,
     junit: Annotated[Path | None, typer.Option(help="Write what changed as JUnit XML.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a page that draws both on the same axes.")] = None,
@@ -85,7 +85,7 @@ def history(
     reports: Annotated[list[Path], typer.Argument(help="Reports or their folders, the oldest first.")],
     metric: Annotated[str, typer.Option(help="Only metrics that match this pattern, changed or not.")] = "",
     case: Annotated[str, typer.Option(help="Only cases that match this pattern.")] = "*",
-    policy: Annotated[Path | None, typer.Option(help="TOML file of what counts as a step.")] = None,
+    policy: Annotated[Path | None, typer.Option(help="TOML file of allowed differences.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a page with a small chart per metric.")] = None,
     json: Json = False,
 ) -> int:
@@ -208,19 +208,21 @@ def run(
             autocompletion=plans,
         ),
     ] = "default",
-    integrator: Annotated[str, typer.Option(help="Measure it beside heyoka: a name, mine.toml, mine.py:solve.")] = "",
+    integrator: Annotated[
+        str, typer.Option(help="Measure it together with heyoka: a name, mine.toml, mine.py:solve.")
+    ] = "",
     out: Annotated[
-        Path | None, typer.Option(help="New folder DIR for the report; without it one in `heavytop-results`.")
+        Path | None, typer.Option(help="New folder DIR for the report; default: one in `heavytop-results`.")
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the run that --out holds.")] = False,
-    workers: Annotated[int | None, typer.Option(help="Local processes; as many as there are processors.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Local processes; default: the number of processors.")] = None,
     scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to run on instead.")] = None,
     parquet: Annotated[bool, typer.Option("--parquet", help="Write DIR/rows.parquet too.")] = False,
     seed: Annotated[
         int, typer.Option(help="0 to 1000; another seed: the same motions with other rounding errors.")
     ] = 0,
     row_timeout: Annotated[
-        str | None, typer.Option(help="Seconds of a row of a third-party integrator, at most.", metavar="SECONDS")
+        str | None, typer.Option(help="Time limit of a row of a third-party integrator.", metavar="SECONDS")
     ] = None,
     save_every: Annotated[float, typer.Option(help="Seconds between checkpoints of a long row.", min=0)] = 10.0,
 ) -> int:

@@ -171,7 +171,7 @@ class Checkpoint:
             self._reader.seek(self.offsets[index])
             content = verified(self._reader.readline().removesuffix(b"\n"))
             if content is None:
-                raise InputError(f"{self.path} was changed while it was in use.", "Go on with --resume.")
+                raise InputError(f"{self.path} was changed while it was in use.", "Continue with --resume.")
             try:
                 yield records.of_row(msgspec.json.decode(content, type=tuple[int, Row])[1])
             except msgspec.MsgspecError as error:

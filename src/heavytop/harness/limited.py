@@ -92,7 +92,7 @@ class RowLimits:
             waiting.extend(remaining)
         for index in skipped:
             name = tasks[index].key.subject.name
-            cause = f"{name} ran out of time in {_MOST_OUT_OF_TIME} other rows and was not asked again"
+            cause = f"{name} ran out of time in {_MOST_OUT_OF_TIME} other rows and was skipped"
             yield index, failed(tasks[index], cause, NotAsked)
 
     def took(self, task: Task, cost: float, row: Row, seconds: float) -> None:

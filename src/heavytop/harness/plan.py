@@ -38,7 +38,7 @@ from heavytop.top.bodies import Body, motion_of
 from heavytop.top.equations import system_of
 from heavytop.top.heavy_top import HeavyTop
 
-_KEYS = "`heavytop docs plans` lists kinds and keys; the plans that ship show them in use."
+_KEYS = "`heavytop docs plans` lists kinds and keys; the built-in plans are examples."
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
 _RENAME = "Give it another name."
 _READABLE = "Give a readable TOML file or a built-in plan, as --plan gate; `heavytop new` makes one of your own."
@@ -198,9 +198,9 @@ def definitions(plan: Plan, folder: Path) -> dict[str, IntegratorSource]:
             sources.append(source)
     defined = {source.name: source for source in sources}
     for name in (name for name in defined if name in known_integrators()):
-        raise InputError(f"The plan {plan.name} defines the integrator {name}, which is there already.", _RENAME)
+        raise InputError(f"The plan {plan.name} defines the integrator {name}, which already exists.", _RENAME)
     if len(defined) < len(sources):
-        raise InputError(f"The plan {plan.name} gives one name to two integrators.", _RENAME)
+        raise InputError(f"The plan {plan.name} gives two integrators the same name.", _RENAME)
     if plan.row_timeout != "":
         seconds_of(plan.row_timeout, "row_timeout")
     return defined
@@ -223,7 +223,7 @@ def _by_name(
         source = text if text in sources else named(text, folder)
         if not isinstance(source, str):
             if sources.setdefault(source.name, source) != source:
-                raise InputError(f"The plan {plan.name} gives one name to two integrators, {source.name}.", _RENAME)
+                raise InputError(f"The plan {plan.name} gives two integrators the name {source.name}.", _RENAME)
             changes["integrator"] = source.name
         return msgspec.structs.replace(table, **changes)
 
@@ -236,7 +236,9 @@ def with_integrator(plan: Plan, integrator: str | IntegratorSource) -> Plan:
     Raises InputError for an unknown integrator, for heyoka itself and for a plan that measures no integrator.
     """
     if integrator == HEYOKA:
-        raise InputError(f"{HEYOKA} is what others are compared with.", "Name another with --integrator, or none.")
+        raise InputError(
+            f"{HEYOKA} is the integrator that others are compared with.", "Name another with --integrator, or none."
+        )
     if not isinstance(integrator, str) and not is_third_party(integrator.name):
         raise InputError(f"The integrator {integrator.name} has the name of a built-in one.", _RENAME)
     require_integrator(integrator)
@@ -301,7 +303,7 @@ def expand(plan: Plan, seed: int = 0, defined: Mapping[str, IntegratorSource] | 
     if unused := known.keys() - measured:
         raise InputError(
             f"The plan {plan.name} does not measure {', '.join(sorted(unused))}.",
-            "Name it in the cases of a [[measure]], or take it out.",
+            "Add it to the cases of a [[measure]], or remove it.",
         )
     parts = [
         ([replace(task, seed=seed) for task in table.tasks(lambda name: case(name, known))], cases)
@@ -322,7 +324,7 @@ def expand(plan: Plan, seed: int = 0, defined: Mapping[str, IntegratorSource] | 
             work = _with_exact_control(task.key)
             if work in labels:
                 other = "" if labels[work] == task.label else f", also as {labels[work]}"
-                raise InputError(f"The plan {plan.name} measures {task.label} twice{other}.", "Name each once.")
+                raise InputError(f"The plan {plan.name} measures {task.label} twice{other}.", "List each once.")
             if task.label in labels.values():  # one case at several horizons
                 templates[index] = replace(task, suffix=f"{task.suffix}/T={task.key.horizon}")
             labels[work] = templates[index].label
@@ -370,7 +372,7 @@ def _swept(plan: Plan) -> dict[str, Sequence[Case]]:
             if sweep.name == earlier.name:
                 raise InputError(f"The plan {plan.name} has two sweeps {sweep.name!r}.", _RENAME)
             if sweep == msgspec.structs.replace(earlier, name=sweep.name):
-                raise InputError(f"The sweeps {earlier.name} and {sweep.name} are the same.", "Take one of them out.")
+                raise InputError(f"The sweeps {earlier.name} and {sweep.name} are the same.", "Remove one of them.")
         swept[f"sweep:{sweep.name}"] = sweep.cases()
     return swept
 
@@ -426,7 +428,7 @@ def positive(texts: list[str], what: str) -> list[Fraction]:
     """Exact numbers; raises InputError unless they are positive and grow."""
     values = [physical(text, what) for text in texts]
     if not values or values != sorted(set(values)) or values[0] <= 0:
-        raise InputError(f"{what} = {texts}", "Give positive numbers in growing order, each once.")
+        raise InputError(f"{what} = {texts}", "Give positive numbers in increasing order, each once.")
     return values
 
 

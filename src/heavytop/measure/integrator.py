@@ -218,7 +218,7 @@ def require_counts(name: str, run: Trajectory, control: tuple[str, Fraction] | N
     span = abs(run.times[-1])
     start = run.problem.start.flat
     if not run.steps and any(tuple(map(exact, state))[:6] != start for state in run.states):
-        raise PeerFailed(f"{name} counts its steps wrongly: it moved, and says that it took no step")
+        raise PeerFailed(f"{name} counts its steps wrongly: it moved, but reports 0 steps")
     if control is not None and control[0] == "step" and 0 < 2 * run.steps < span / control[1]:
         raise PeerFailed(
             f"{name} counts its steps wrongly: {run.steps} over {six_digits(span)}, where each is "

@@ -346,7 +346,7 @@ def test_a_run_that_ends_early_says_so() -> None:
 @pytest.mark.parametrize(
     ("changes", "match"),
     [
-        ({"until": 0}, "until = 0"),
+        ({"until": 0}, "until must not be 0"),
         ({"until": "nan"}, "not a finite number"),
         ({"until": "1e151"}, "too large"),
         ({"direction": 2}, "direction must be a sign; got 2"),
@@ -361,14 +361,14 @@ def test_a_run_that_ends_early_says_so() -> None:
         ({"function": "omega1 + __import__('os')"}, "not part of"),
         ({"function": "omega1 + " * 2000 + "1"}, "too long"),
         ({"function": "(" * 90 + "omega1"}, "not a function"),
-        ({"function": 3}, "neither text nor a callable"),
+        ({"function": 3}, "must be text or a callable"),
         ({"function": lambda omega, gamma: 1 / 0}, "raised ZeroDivisionError"),
         ({"function": lambda omega, gamma: float("nan")}, "gave nan"),
         ({"function": lambda omega, gamma: "x"}, "raised TypeError"),
         ({"function": lambda omega, gamma: abs(omega[0]), "digits": 10}, "must be rational"),
         ({"integrator": "scipy"}, "has no dense output"),
         ({"digits": 0}, "digits must be from 1"),
-        ({"digits": 10, "precision": ht.QUAD}, "know no precision"),
+        ({"digits": 10, "precision": ht.QUAD}, "do not support precision"),
         ({"limit": 0}, "must be at least 1"),
     ],
 )
@@ -419,7 +419,7 @@ def test_a_section_of_several_starts() -> None:
     (area,) = ht.poincare(with_rotor, START, 1, "gamma2").areas
     momentum = with_rotor.angular_momentum(START.omega)
     assert area == float(sum(m * g for m, g in zip(momentum, START.gamma, strict=True)))
-    with pytest.raises(InputError, match="no starts"):
+    with pytest.raises(InputError, match="No starts were given"):
         ht.poincare(TOP, [], 40)
     with pytest.raises(InputError, match=r"Start 1: .*zero along"):
         ht.poincare(PENDULUM, [ht.State((0, 1, 0), (1, 0, 0)), ht.State((0, 0, 1), (1, 0, 0))], 5, "omega2")

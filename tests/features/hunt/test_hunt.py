@@ -48,7 +48,7 @@ def test_a_planted_fault_is_found_and_shrunk(fault: str, monkeypatch: pytest.Mon
     else:
         assert worst["outcome"] == "failed"
     assert worst["toml"].startswith("[[top]]\n")
-    assert "What is special" in str(hunt)
+    assert "Features: " in str(hunt)
 
 
 @pytest.mark.slow

@@ -137,7 +137,7 @@ def test_a_count_of_steps_makes_no_step_of_a_given_length_shorter_and_none_at_al
 
     monkeypatch.setattr(Integrator, "propagate", miscounted)
     if not times:
-        with pytest.raises(PeerFailed, match=f"{name} moved, and says that it took no step"):
+        with pytest.raises(PeerFailed, match=f"{name} moved, but reports 0 steps"):
             called(name, "lagrange", 1)
         return
     _, calls = called(name, "lagrange", 1)

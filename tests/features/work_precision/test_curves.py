@@ -98,7 +98,7 @@ def test_constants_that_are_no_gain_or_alone_or_too_coarse_change_no_claim() -> 
     )
     assert (slower.name, slower.ratio, slower.general) == ("heyoka double", pytest.approx(4.5), None)
     assert (alone.name, alone.general) == ("heyoka:constants", ("heyoka double", None))
-    assert "heyoka double, one code for every top, does not get there" in alone.text
+    assert "heyoka double, one code for every top, does not reach it" in alone.text
     assert alone.short.endswith("cyrk:DOP853")
     assert (coarse.name, coarse.ratio) == ("heyoka double", pytest.approx(4.5))
 
@@ -125,13 +125,13 @@ def test_no_two_of_many_curves_look_alike() -> None:
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
-        (OURS + SPLITTING, "takes 2 s; no other gets there"),
-        (OURS + FAILED, "no other gets there"),
+        (OURS + SPLITTING, "takes 2 s; no other reaches it"),
+        (OURS + FAILED, "no other reaches it"),
         (
             [OURS[0], row("multiword tolerance=eps", -15, 0.5)],
-            "top/T=9: heyoka double at error 1e-10: not reached; the fastest that gets there is multiword (500 ms)",
+            "top/T=9: heyoka double at error 1e-10: not reached; the fastest that reaches it is multiword (500 ms)",
         ),
-        (OURS[:1] + CYRK, "not reached; the fastest that gets there is cyrk:DOP853 (9 s)"),
+        (OURS[:1] + CYRK, "not reached; the fastest that reaches it is cyrk:DOP853 (9 s)"),
         (
             [*OURS, row("fast:x tolerance=1", -11, 0.5)],
             "the fastest at error 1e-10 is fast:x (500 ms); heyoka double is 0.25 × as fast (2 s)",
@@ -235,7 +235,7 @@ def test_who_is_fastest_at_1e_10_opens_the_page() -> None:
     third = [row(f"{name} tolerance=1", -11, seconds, case="c") for name, seconds in (("heyoka", 6.0), ("fast:x", 3.0))]
     said = "heyoka double is the fastest at error 1e-10 on 2 of 3 motions: 3.0 to 4.5 times as fast"
     assert fastest(ALL + other + third) == Headline(f"{said} as the best other than heyoka; fast:x on 1.")
-    least = "The least error is 1e-11: cyrk:DOP853 on top/T=9, in 27 s."
+    least = "The smallest error is 1e-11: cyrk:DOP853 on top/T=9, in 27 s."
     assert fastest(OURS[:1] + CYRK) == Headline(least)
     assert fastest([]) is None
 
@@ -298,7 +298,7 @@ def test_seconds_that_are_not_resolved_are_printed_as_that_and_compared_with_not
     assert resolved == ["1.0e-12", "500 ms", "4 s"]
     assert order == ["2.1", "", ""]
     assert leads(rows) == []
-    assert fastest([quick]) == Headline("The least error is 1e-11: mine:rk4 on top/T=9, in < 0.1 ms.")
+    assert fastest([quick]) == Headline("The smallest error is 1e-11: mine:rk4 on top/T=9, in < 0.1 ms.")
     section = work_precision([("", report(*rows))])
     assert section is not None
     assert [cells[5] for cells in section.rows] == ["1", "4", "< 0.0001", "0.5"]

@@ -121,7 +121,7 @@ def test_a_rotor_has_no_way_back(tmp_path: Path) -> None:
     [
         ('{ integrator = "rk4", tolerances = ["1e-6"] }', "Unknown integrator 'rk4'"),
         ('{ integrator = "heyoka" }', "The list of points of heyoka is empty"),
-        ('{ integrator = "heyoka", tolerances = ["0"] }', "A tolerance of '0'"),
+        ('{ integrator = "heyoka", tolerances = ["0"] }', "tolerances must be above 0, up to 1; got '0'"),
         ('{ integrator = "heyoka", tolerances = ["small"] }', "'small' is not a finite number"),
         ('{ integrator = "heyoka", precision = "half", tolerances = ["1e-3"] }', "Unknown precision 'half'"),
         ('{ integrator = "heyoka", tolerances = ["1e-6", "1e-6"] }', "twice"),

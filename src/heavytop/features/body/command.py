@@ -14,12 +14,13 @@ from heavytop.errors import ExitCode
 @command
 def body(
     file: Annotated[Path, typer.Argument(help="A URDF, MJCF or SDF file, USD, or TOML with a body.")],
-    link: Annotated[str | None, typer.Option(help="Which link or body, where the file has several.")] = None,
+    link: Annotated[str | None, typer.Option(help="Link or body, if the file has several.")] = None,
     pivot: Annotated[
-        str | None, typer.Option(help="Fixed point x,y,z in the axes of the link; without it a ball joint, or 0,0,0.")
+        str | None, typer.Option(help="Fixed point x,y,z in the axes of the link; default: a ball joint, or 0,0,0.")
     ] = None,
     gravity: Annotated[
-        str | None, typer.Option(help="Acceleration of gravity in the printed table; without it the file's, or 9.81.")
+        str | None,
+        typer.Option(help="Acceleration of gravity in the printed table; default: that of the file, or 9.81."),
     ] = None,
     json: Json = False,
 ) -> int:

@@ -22,7 +22,7 @@ def audit(
         str, typer.Argument(help="ershkov-general, ershkov-partial, a name of `heavytop claims`, or a TOML file.")
     ] = "",
     system: Annotated[
-        str | None, typer.Option(help="heavy_top, gyrostat or heavy_gyrostat; without it that of the file.")
+        str | None, typer.Option(help="heavy_top, gyrostat or heavy_gyrostat; default: that of the file.")
     ] = None,
     branch: Annotated[str | None, typer.Option(help="Only that branch: smooth or printed.")] = None,
     library: Annotated[bool, typer.Option("--library", help="Audit all of `heavytop claims`: three minutes.")] = False,
@@ -77,7 +77,7 @@ def _library(json: bool) -> int:
 
 @command
 def claims(
-    tag: Annotated[str | None, typer.Option(help="Only those with that tag, such as a class or a system.")] = None,
+    tag: Annotated[str | None, typer.Option(help="Only claims with that tag, such as a class or a system.")] = None,
     json: Json = False,
 ) -> int:
     """List published claims and usual misprints, by verdict.

@@ -133,7 +133,7 @@ def events(
         return locate(run, str(named_one), wanted, axes)
     if (precision, integrator, tolerance, step_limit) != (DOUBLE, "heyoka", None, None):
         raise InputError(
-            "Proven events (digits) know no precision, integrator, tolerance or step_limit.",
+            "Proven events (digits) do not support precision, integrator, tolerance or step_limit.",
             "Leave these out, or digits.",
         )
     body, state = arguments.motion(top, start, of_any_size=True)
@@ -218,7 +218,7 @@ def poincare(
     """
     listed = arguments.listed(starts, State, "starts")
     if not listed:
-        raise InputError("There are no starts.", "Give at least one State.")
+        raise InputError("No starts were given.", "Give at least one State.")
     sections: list[Events | ReferenceEvents] = []
     for index, start in enumerate(listed):
         with prefixed(f"Start {index}"):
@@ -249,7 +249,7 @@ def _as_float(value: Fraction) -> float:
 def _until(value: Number) -> Fraction:
     end = physical(value, "until")
     if end == 0:
-        raise InputError("until = 0 leaves no time for an event.", "Give a time of either sign.")
+        raise InputError("until must not be 0.", "Give a time of either sign.")
     return end
 
 

@@ -56,7 +56,7 @@ class Ratio:
             if part.total_degree() > _HIGHEST or len(part) > _MOST_TERMS:
                 raise InputError(
                     f"The function has degree {part.total_degree()} and {len(part)} terms.",
-                    f"Up to degree {_HIGHEST} and {_MOST_TERMS} terms are taken.",
+                    f"Degrees up to {_HIGHEST} and {_MOST_TERMS} terms are supported.",
                 )
         self.numerator, self.denominator = numerator, denominator
 
@@ -97,7 +97,7 @@ class Ratio:
         o = Ratio.of(other)
         pairs = (self.numerator, o.numerator), (self.denominator, o.denominator)
         if (degree := max(a.total_degree() + b.total_degree() for a, b in pairs)) > _HIGHEST:
-            raise InputError(f"The function has degree {degree}.", f"Up to degree {_HIGHEST} is taken.")
+            raise InputError(f"The function has degree {degree}.", f"Degrees up to {_HIGHEST} are supported.")
         return Ratio(self.numerator * o.numerator, self.denominator * o.denominator)
 
     def __truediv__(self, other: Any) -> Ratio:
@@ -211,7 +211,7 @@ def event_function(function: Any) -> EventFunction:
             return EventFunction(name, call=function)
         parsed = tried
     else:
-        raise InputError(f"function = {quoted(function)} is neither text nor a callable.", _REMEDY)
+        raise InputError(f"function must be text or a callable; got {quoted(function)}.", _REMEDY)
     parsed = parsed.reduced()
     if parsed.numerator.is_constant() and parsed.denominator.is_constant():
         raise InputError(f"The function {quoted(name)} does not depend on the state.", _REMEDY)
@@ -246,7 +246,7 @@ def _variables() -> list[Ratio]:
 def _parsed(text: str) -> Ratio:
     """The rational function of a text, in which one ``=`` may stand."""
     if len(text) > _LONGEST:
-        raise InputError(f"A function of {len(text)} characters is too long.", f"At most {_LONGEST} are read.")
+        raise InputError(f"A function of {len(text)} characters is too long.", f"Use at most {_LONGEST} characters.")
     sides = text.replace("^", "**").split("=")
     if len(sides) > 2 or not all(side.strip() for side in sides):
         raise InputError(f"{quoted(text)} is not a function.", _REMEDY)
@@ -388,7 +388,7 @@ def first_term(
     raise InputError(
         f"The function {quoted(function.name)} {fault} along this motion: the first {terms} terms of its series at "
         "t = 0 vanish.",
-        "A change of sign needs a function that is defined and not zero all the time; choose another one.",
+        "Choose a function that is defined and not identically zero.",
     )
 
 

@@ -222,7 +222,8 @@ def _begins(solution: Validated, function: EventFunction) -> tuple[int, int]:
     order, value = first_term(function, solution.system, solution.parameters, solution.start.flat)
     if order > _MOST_ORDER:
         raise OutOfReach(
-            f"The first {order - 1} derivatives of the function vanish at t = 0.", f"Up to {_MOST_ORDER} are followed."
+            f"The first {order - 1} derivatives of the function vanish at t = 0.",
+            f"At most {_MOST_ORDER} are supported.",
         )
     return order, 1 if value > 0 else -1
 
@@ -278,7 +279,7 @@ class _Search:
                 self.wanted.reached(self._time(min(covered, span)))
             yield piece
         if covered < span:
-            raise _Undecided(self._time(covered), "how the motion goes on: too many bits are lost")
+            raise _Undecided(self._time(covered), "the further motion: too many bits are lost")
 
     def _zeros(self, pieces: Iterator[_Piece], after: int) -> Iterator[tuple[Fraction, Fraction]]:
         """Scaled times between which there is exactly one zero, simple or proven by its derivatives.

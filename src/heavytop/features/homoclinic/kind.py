@@ -151,7 +151,7 @@ class Homoclinic(Kind):
         yield from in_columns(title, lambda row: short(row.metrics[ESCAPE.text].value), shown)
         yield from (Note(sentence, shown=In.SHORT) for sentence in _hidden(shown))
         yield Cells(
-            "Integrators on a homoclinic motion, against its closed form",
+            "Integrators on a homoclinic motion, compared with its closed form",
             ["case", "format", "Ω error", "γ error", "drift", "escape |t|", "outcome"],
             both((row, _cells(row)) for row in rows),
             [

@@ -96,9 +96,9 @@ def hunt(
     motions, seconds = _budget(budget)
     beyond = None if limit is None else float(physical(limit, "limit"))
     if beyond is not None and not beyond > 0:
-        raise InputError(f"limit = {quoted(limit)} is not above 0.", "Give a positive number, or leave it out.")
+        raise InputError(f"limit must be positive; got {quoted(limit)}.", "Give a positive number, or leave it out.")
     if other is not None and other == which:
-        raise InputError("An integrator is not hunted against itself.", "Give another with --against, or none.")
+        raise InputError("integrator and against must differ.", "Give another one, or leave out --against.")
     first = as_integer(seed, "seed")
     if not 0 <= first <= 10**9:
         raise refusal("seed", "in range", quoted(first), "Give a number from 0 to 1000000000.")

@@ -15,9 +15,13 @@ def hunt(
     integrator: Annotated[str, typer.Option(help="A name of `heavytop list`, mine.toml or mine.py:solve.")] = "heyoka",
     precision: Annotated[str, typer.Option(help="Number format.")] = "double",
     horizon: Annotated[str, typer.Option(help="Time up to which errors count.")] = "100",
-    budget: Annotated[str, typer.Option(help="Motions, 5000, or seconds, 60s, of at least 64 motions.")] = "5000",
+    budget: Annotated[
+        str, typer.Option(help="Number of motions, or seconds such as 60s (at least 64 motions).")
+    ] = "5000",
     family: Annotated[str, typer.Option(help="any, euler, lagrange, kovalevskaya or heavy_gyrostat.")] = "any",
-    against: Annotated[str | None, typer.Option(help="Search for the largest ratio to its error.")] = None,
+    against: Annotated[
+        str | None, typer.Option(help="Search for the largest ratio to the error of this integrator.")
+    ] = None,
     limit: Annotated[
         str | None, typer.Option(help="Report errors above LIMIT eps T^1.5; with --against, above that ratio.")
     ] = None,

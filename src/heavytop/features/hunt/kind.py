@@ -48,9 +48,9 @@ class HuntTable(PlanTable, tag=NAME):
         """One task."""
         (horizon,) = positive([self.horizon], "horizon")
         if not 1 <= self.budget <= _MOST:
-            raise InputError(f"budget = {self.budget} is not a number of motions.", f"Give 1 to {_MOST}.")
+            raise InputError(f"budget must be from 1 to {_MOST} motions; got {self.budget}.", "Change the budget.")
         if self.limit and exact(self.limit) <= 0:
-            raise InputError(f"limit = {quoted(self.limit)} is not above 0.", "Give a positive number.")
+            raise InputError(f"limit must be positive; got {quoted(self.limit)}.", "Give a positive number.")
         if self.found:
             kept(Path(self.found))
         name = f"{self.family}-{self.seed}"

@@ -617,22 +617,22 @@ def _start(top: HeavyTop, start: State) -> list[str]:
     swing = math.sqrt(math.sqrt(pull) / float(min(top.inertia)))
     sentences = []
     if spin == 0 or swing == 0:
-        sentences.append("Ω = 0" if spin == 0 else "no torque of the weight")
+        sentences.append("Ω = 0" if spin == 0 else "no gravitational torque")
     elif spin > _FAST * swing:
-        sentences.append(f"spins {spin / swing:.3g} times as fast as its weight swings it")
+        sentences.append(f"spin rate {spin / swing:.3g} times the pendulum rate")
     elif swing > _FAST * spin:
-        sentences.append(f"slow: Ω is {spin / swing:.2g} of what its weight makes of it")
+        sentences.append(f"slow: Ω is {spin / swing:.2g} of the pendulum rate")
     field = [abs(value) for value in system.field(parameters.mapped(Fraction), start.flat)]
     unit = spin + swing or 1.0
     speed = max(float(max(field[:3])) / unit**2, float(max(field[3:])) / unit)
     if not any(field):
         sentences.append("an equilibrium")
     elif speed < _NEAR:
-        sentences.append(f"near an equilibrium: the field is {speed:.1g} of what it could be")
+        sentences.append(f"near an equilibrium: the field is {speed:.1g} of its bound")
     energy = dot(top.angular_momentum(start.omega), start.omega) / 2 + dot(top.moment, start.gamma)
     height = math.sqrt(pull)
     if height and abs(float(energy) / height - 1) < _NEAR:
-        sentences.append("near a separatrix: its energy is that of rest with the centre of mass above")
+        sentences.append("near a separatrix: its energy is that of the upright equilibrium")
     return [*sentences, f"energy {float(energy):.4g}, P|r| = {height:.4g}"]
 
 

@@ -527,7 +527,7 @@ def _shape(motion: Motion) -> object:
 # The findings of a hunt as texts: data, class, command and table of a plan; and the file of findings.
 
 
-_PASTE = "It holds [[top]] tables, as heavytop hunt prints them."
+_PASTE = "Give [[top]] tables, as heavytop hunt prints them."
 
 
 def documents(hunted: Hunted, integrator: str) -> list[dict[str, Any]]:
@@ -591,7 +591,8 @@ def kept(path: Path) -> tuple[Motion, ...]:
         raise InputError(f"{path} cannot be read: {invalid(error)}.", _PASTE) from None
     if any(case.system is GYROSTAT for case in cases):
         raise InputError(
-            f"{path} holds a top of the system gyrostat.", "Take it out: heavy tops and heavy gyrostats are hunted."
+            f"{path} contains a top of the system gyrostat.",
+            "Remove it: only heavy_top and heavy_gyrostat are supported.",
         )
     return tuple((case.top, case.start) for case in cases)
 

@@ -23,14 +23,14 @@ def hunt_text(hunted: Hunted, documents: Sequence[dict[str, Any]], again: str) -
         lines += [*_found(hunted, number, document, m, p), ""]
     if not documents:
         lines += [*_nothing(hunted), ""]
-    return "\n".join([*lines, "The same search again:", f"  {again}"])
+    return "\n".join([*lines, "Repeat the search with:", f"  {again}"])
 
 
 def law_text(hunted: Hunted) -> str:
     """The law of the errors of this integrator."""
     return (
         f"{hunted.law:.2g} eps times the motion's own amplification times √(1 + rate T), "
-        "the law of nine tenths of the random tops"
+        "which bounds nine tenths of the random tops"
     )
 
 
@@ -53,9 +53,9 @@ def _searched(hunted: Hunted) -> str:
     text = f"{request.integrator.name} in {request.precision.name} to T = {time_text(request.horizon)}: "
     text += f"{plural(hunted.motions, 'motion')} tried of {hunted.planned}."
     if hunted.unknown:
-        text += f" The true motion of {hunted.unknown} was out of reach."
+        text += f" No reference was within reach for {hunted.unknown}."
     if hunted.lost:
-        text += f" On {hunted.lost} no integrator of this format keeps a digit."
+        text += f" {plural(hunted.lost, 'motion loses', 'motions lose')} all digits in every integrator of this format."
     return fill(text, _WIDTH)
 
 
@@ -67,7 +67,7 @@ def _nothing(hunted: Hunted) -> list[str]:
         beyond = f"an error of {request.limit:.3g} eps T^1.5"
     else:
         beyond = f"an error two decades beyond what explains it: {law_text(hunted)}"
-    lines = [fill(f"Nothing was found: no run failed, and none has {beyond}.", _WIDTH)]
+    lines = [fill(f"Nothing found: no run failed, and none has {beyond}.", _WIDTH)]
     if hunted.worst:
         lines += ["The worst:", *_folded(worst_lines(hunted))]
     return lines
@@ -77,7 +77,7 @@ def _found(hunted: Hunted, number: int, document: dict[str, Any], m: MeasuredMot
     eps = float(hunted.request.precision.eps)
     if math.isinf(m.error):
         head = f"{number}. The run ends as {m.outcome}" + (f": {m.reason}" if m.reason else "")
-        proof = f"The true motion exists there, {p.against}."
+        proof = f"The motion exists there, {p.against}."
     else:
         head = f"{number}. {_right(p.error, eps)} digits right: an error of {p.error:.3g}"
         word = "Proven" if p.proven else "Not proven"
@@ -87,11 +87,11 @@ def _found(hunted: Hunted, number: int, document: dict[str, Any], m: MeasuredMot
     features = "; ".join([document["class"], *special(m)])
     return [
         fill(f"{head}.", _WIDTH),
-        *_folded([f"{usual} {other}", f"What is special: {features}.", proof]),
+        *_folded([f"{usual} {other}", f"Features: {features}.", proof]),
         "",
         document["toml"],
         "",
-        "It shows again by:",
+        "Reproduce it with:",
         f"  {document['command']}",
     ]
 
@@ -103,7 +103,7 @@ def _right(error: float, eps: float) -> str:
 
 def _other_error(other: Integrator, p: Proof, eps: float) -> str:
     if p.other is None:
-        return f"How many digits of {other.name} are right here is not known."
+        return f"The number of digits right of {other.name} is unknown here."
     if math.isinf(p.other):
         return f"{other.name} does not reach the horizon here either."
     times = ratio(p.error, p.other, eps)

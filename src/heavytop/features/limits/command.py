@@ -16,18 +16,18 @@ _SECONDS = 1.0
 
 @command
 def power(
-    until: Annotated[str, typer.Option(help="Where the test ends.")],
+    until: Annotated[str, typer.Option(help="Time at which the test ends.")],
     tolerance: Annotated[str, typer.Option(help="Largest error that passes: absolute below 1, relative above.")],
     case: Annotated[str | None, typer.Option(help="A case of `heavytop list`.", autocompletion=cases)] = None,
-    file: Annotated[str | None, typer.Option(help="In place of --case a robot's file, with --omega.")] = None,
-    link: Annotated[str | None, typer.Option(help="Link of the file.")] = None,
+    file: Annotated[str | None, typer.Option(help="File of a robot in place of --case, with --omega.")] = None,
+    link: Annotated[str | None, typer.Option(help="Link in the file.")] = None,
     gravity: Annotated[str, typer.Option(help="With --file: the acceleration of gravity.")] = "9.81",
     omega: Annotated[str | None, typer.Option(help="With --file: angular velocity x,y,z at t = 0.")] = None,
     quaternion: Annotated[str, typer.Option(help="With --file: attitude w,x,y,z at t = 0.")] = "1,0,0,0",
-    step: Annotated[str | None, typer.Option(help="Between samples; a hundredth of --until without it.")] = None,
+    step: Annotated[str | None, typer.Option(help="Time between samples; default: --until/100.")] = None,
     planted: Annotated[str, typer.Option(help="Names of faults, or all.")] = "all",
-    integrator: Annotated[str, typer.Option(help="Of a right run.")] = "heyoka",
-    control: Annotated[str | None, typer.Option(help="Tolerance or step of the right run.")] = None,
+    integrator: Annotated[str, typer.Option(help="Format of the correct run.")] = "heyoka",
+    control: Annotated[str | None, typer.Option(help="Tolerance or step of the correct run.")] = None,
     json: Json = False,
 ) -> int:
     """Say how long a regression test must be.
@@ -44,7 +44,7 @@ def power(
     if case is not None:
         if (link, gravity, omega, quaternion) != (None, "9.81", None, "1,0,0,0"):
             raise InputError(
-                "The case has a start and gravity of its own.",
+                "A case defines its start and gravity.",
                 "Give --link, --gravity, --omega and --quaternion with --file.",
             )
         known = case_named(case)

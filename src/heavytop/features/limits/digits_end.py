@@ -87,8 +87,8 @@ class DigitsEnd(Tabular):
                 continue
             how = "proven" if loss.proven else "computed, beyond the reach of a proof"
             lines.append(
-                f"{what}: lost at t = {six_digits(loss.time)} by whoever rounds the state to {self.precision} "
-                f"at t = {six_digits(loss.rounded_at)}, with exact arithmetic before and after ({how})"
+                f"{what}: lost at t = {six_digits(loss.time)} after one rounding of the state to {self.precision} "
+                f"at t = {six_digits(loss.rounded_at)}, in exact arithmetic otherwise ({how})"
             )
         return lines
 
@@ -97,7 +97,7 @@ class DigitsEnd(Tabular):
             (six_digits(time), f"{digits:z.1f}")
             for time, digits in [*zip(self.times, self.digits, strict=True)][_EACH - 1 :: _EACH]
         ]
-        title = f"Digits that one rounding to {self.precision} leaves, of {self.of_digits:.1f}"
+        title = f"Digits that remain after one rounding to {self.precision}, of {self.of_digits:.1f}"
         return TitledTable(title, ("t", "digits"), rows, self.sentences())
 
 
@@ -125,9 +125,9 @@ def digits_end(
     body, state = arguments.motion(top, start, form)
     about, end = arguments.system(system, body), physical(until, "until")
     if not end:
-        raise InputError("until must not be 0; got 0.", "Give the time up to which digits are followed.")
+        raise InputError("until must not be 0; got 0.", "Give a time of either sign.")
     if about is GYROSTAT:
-        raise InputError("digits_end is not of the system gyrostat.", "Use heavy_gyrostat, with a rotor.")
+        raise InputError("digits_end does not support the system gyrostat.", "Use heavy_gyrostat, with a rotor.")
     setup = Setup.of(body, state, form, about)
     problem = Problem.of(setup.top, setup.start, form, about)
     times = tuple(end * k / _TIMES for k in range(_TIMES + 1))

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 
 Ends = Annotated[
     bool,
-    typer.Option("--digits-end", help="Also the times by which one rounding costs the first digit, and all digits."),
+    typer.Option(
+        "--digits-end", help="Also the times by which one rounding error costs the first digit, and all digits."
+    ),
 ]
 Between = Annotated[
     str | None,

@@ -93,7 +93,7 @@ class Power(Tabular):
         ]
         end = six_digits(self.times[-1])
         verdict = "passes" if self.passes else "fails"
-        notes = [f"a right run {verdict}: its largest error is {self.error:.2g}"]
+        notes = [f"a correct run {verdict}: its largest error is {self.error:.2g}"]
         notes += [f"{name} is not planted: {why}" for name, why in self.left_out.items()]
         title = f"A test up to t = {end} with tolerance {self.tolerance:.2g}"
         return TitledTable(title, ("planted fault", "detected from t", "widest tolerance"), rows, notes)
@@ -129,7 +129,7 @@ def power(
     body, state = arguments.motion(top, start)
     motion = body, state, arguments.system(system, body)
     if motion[2] is GYROSTAT:
-        raise InputError("power is not of the system gyrostat.", "Use heavy_gyrostat, with a rotor.")
+        raise InputError("power does not support the system gyrostat.", "Use heavy_gyrostat, with a rotor.")
     end, limit = physical(until, "until"), float(physical(tolerance, "tolerance"))
     spacing = end / 100 if step is None else physical(step, "step")
     if not (0 < spacing <= end and limit > 0):
@@ -213,7 +213,7 @@ def _steiner(motion: Motion, times: Sequence[Fraction], changed: Any) -> Array |
     """The motion with the Steiner term forgotten, or added twice."""
     body = motion[0]
     if not isinstance(body, Body) or not any(body.centre):
-        return "no mass off the pivot is given"
+        return "the mass is unknown, or its centre is the pivot"
     return _of_tensor(motion, times, changed(body.tensor, steiner(body.mass, body.centre)))
 
 
@@ -224,7 +224,7 @@ def _of_tensor(motion: Motion, times: Sequence[Fraction], tensor: Any) -> Array 
     try:
         other = Body(body.mass, body.gravity, body.centre, six_of(tensor), PIVOT, body.rotor)
     except InputError:
-        return "no body has the tensor"
+        return "no rigid body has the tensor"
     return _rows((other, start, system), times)
 
 
@@ -249,7 +249,7 @@ def _order(motion: Motion, times: Sequence[Fraction]) -> Array | str:
 def _gravity(motion: Motion, times: Sequence[Fraction]) -> Array | str:
     body, start, system = motion
     if not any(body.moment):
-        return "no weight turns the body"
+        return "the weight exerts no torque"
     if isinstance(body, Body):
         other: HeavyTop | Body = Body(body.mass, body.gravity * _G, body.centre, six_of(body.tensor), PIVOT, body.rotor)
     else:

@@ -87,7 +87,9 @@ class LocalErrorKind(Kind):
         for time, step in steps:
             error(time, step)
         if run.outcome is Outcome.SUCCESS and not error.running.count:
-            raise OutOfReach(f"{case.name} rests, so its integrator takes no step.", "Measure the steps of a motion.")
+            raise OutOfReach(
+                f"{case.name} is an equilibrium, on which integrators take no steps.", "Measure the steps of a motion."
+            )
         row = computed_row(task, run, error.metrics(), {}, _AGAINST)
         row = msgspec.structs.replace(row, samples=error.running.count)
         if task.integrator.own:
@@ -108,7 +110,7 @@ class LocalErrorKind(Kind):
         if shown:
             yield Headline(_said(max(shown, key=_size)))
         yield from (Note(_said(row), shown=In.SHORT) for row in shown)
-        columns = "case", "format", "steps", "largest", "rms", "order seen", "of runs", "declared", "outcome"
+        columns = "case", "format", "steps", "largest", "rms", "order observed", "of runs", "declared", "outcome"
         title = "Single steps, each against the proven motion from where it starts"
         yield Cells(title, columns, [_cells(row) for row in rows], [_UNITS], shown=In.FULL | In.PAGE)
 
@@ -117,8 +119,7 @@ def _of_runs(task: Task, integrator: Integrator) -> Row:
     """The row of a method with a memory: the error at the end, and the order that whole runs show."""
     if integrator.set_to is None:
         raise Unsupported(
-            f"{integrator.name} declares that it keeps a memory, and is set by a tolerance: there is no order, and no "
-            "single step.",
+            f"{integrator.name} is a multistep method with a tolerance: it has neither an order nor single steps.",
             "Measure whole runs: work_precision.",
         )
     case = task.given
@@ -184,7 +185,7 @@ def _said(row: Row) -> str:
             largest = short(decimal_text(exact(metric.value) * Fraction(2) ** (1 - row.bits), 2), 2)
         text = f"{text}: one step errs by at most {largest}"
     else:
-        text = f"{text}: its run is off by {_number(row, ERROR.text)} at t = {row.key.horizon}"
+        text = f"{text}: the error of its run is {_number(row, ERROR.text)} at t = {row.key.horizon}"
     order = _order(row)
     return f"{text}{'; ' if order else ''}{order}.{' ' + row.explained.text if row.explained else ''}"
 
@@ -204,5 +205,5 @@ def _order(row: Row) -> str:
         text = f"order {order} confirmed{steps}"
     elif row.order and known:
         text += f", {'not' if int(order) < row.order else 'more than'} the declared {row.order}"
-    hint = f" ({single} in single steps: declare one_step = false where it keeps a memory)"
+    hint = f" ({single} in single steps: a multistep method should declare one_step = false)"
     return text + (hint if runs and single not in ("", runs) else "")

@@ -202,10 +202,10 @@ def stepped(integrator: Integrator) -> Integrator:
 def _require_count(integrator: Integrator, run: Trajectory) -> None:
     """Raises Unsupported where the steps of a run are not counted, PeerFailed where it moved in none."""
     if NOT_COUNTED.items() <= run.flags.items():
-        raise Unsupported(f"{integrator.name} does not say how many steps it takes.", "Say it: `done steps N`.")
+        raise Unsupported(f"{integrator.name} does not report its number of steps.", "Report it: `done steps N`.")
     moved = any(tuple(map(exact, state)) != run.problem.start.flat for state in run.states)
     if moved and run.steps == 0:
-        raise PeerFailed(f"{integrator.name} moved, and says that it took no step")
+        raise PeerFailed(f"{integrator.name} moved, but reports 0 steps")
 
 
 def unexplained(whole: Trajectory, length: Fraction, step: Fraction, amplification: float) -> str:

@@ -148,10 +148,10 @@ class Lead:
         goal = f"{self.case}: {self.name} at error 1e{self.log10:g}"
         if self.ours is None:
             theirs = "" if self.theirs is None else seconds_text(self.theirs)
-            fastest = f"; the fastest that gets there is {self.other} ({theirs})" if theirs else ""
+            fastest = f"; the fastest that reaches it is {self.other} ({theirs})" if theirs else ""
             return f"{goal}: not reached{fastest}"
         if self.ratio is None or self.theirs is None:
-            parts = [f"{goal} takes {seconds_text(self.ours)}; no other gets there"]
+            parts = [f"{goal} takes {seconds_text(self.ours)}; no other reaches it"]
         elif self.ratio < 1:
             parts = [
                 f"{self.case}: the fastest at error 1e{self.log10:g} is {self.other} ({seconds_text(self.theirs)})"
@@ -172,7 +172,7 @@ class Lead:
 
     def _general_said(self, seconds: float | None) -> str:
         if seconds is None:
-            return "does not get there"
+            return "does not reach it"
         ratio = self._ratio(seconds)
         return f"takes {seconds_text(seconds)}" if ratio is None else f"is {_speed(ratio)} ({seconds_text(seconds)})"
 
@@ -334,5 +334,5 @@ def _least_error(rows: Sequence[Row]) -> Headline | None:
     if not best:
         return None
     point, case, label = min(best, key=lambda entry: entry[0].log10)
-    text = f"The least error is {scientific(point.log10)}: {clip(label, 40)} on {clip(case, 40)}"
+    text = f"The smallest error is {scientific(point.log10)}: {clip(label, 40)} on {clip(case, 40)}"
     return Headline(f"{text}, in {point.takes()}.")

@@ -71,10 +71,10 @@ class Curve(msgspec.Struct, forbid_unknown_fields=True):
             raise InputError(f"The list of points of {self.integrator} is empty.", "Give it tolerances, or steps.")
         for text in self.steps:
             if text != FINEST and physical(text, "step") <= 0:
-                raise InputError(f"A step of {text[:60]!r}.", "Give numbers above 0.")
+                raise InputError(f"steps must be positive; got {text[:60]!r}.", "Give positive numbers.")
         for text in self.tolerances:
             if text != FINEST and not 0 < physical(text, "tolerance") <= 1:
-                raise InputError(f"A tolerance of {text[:60]!r}.", "Give numbers above 0, up to 1.")
+                raise InputError(f"tolerances must be above 0, up to 1; got {text[:60]!r}.", "Give such numbers.")
             if self.integrator in (OURS, CONSTANTS, LANES) and text != FINEST:
                 usable_tolerance(text, parse(self.precision))
         yield from (computed(self.integrator, tolerance=text) for text in self.tolerances)

@@ -363,7 +363,7 @@ class CheckedPlugin:
             what = f"{len(states)} of {len(asked)} states, and said that it reached t = {said(run.time_reached)}"
             self._require(last <= abs(reached) < following, what)
         named = type(run.integrator) is str and 0 < len(run.integrator) <= _MOST_SAID and run.integrator.isprintable()
-        self._require(named, "no name of an integrator")
+        self._require(named, "no integrator name")
         seconds = {name: self._seconds(run.seconds[name]) for name in ("compile", "run")}
         return Trajectory(
             problem,
@@ -400,13 +400,13 @@ class CheckedPlugin:
         return numpy.array([number(exact(value), precision) for value in values])
 
     def _count(self, value: Any, what: str) -> int:
-        self._require(hasattr(value, "__index__") and not isinstance(value, bool), f"{what} that are no count")
+        self._require(hasattr(value, "__index__") and not isinstance(value, bool), f"{what} that are not a count")
         self._require(value >= 0, f"a negative count of {what}")
         return int(value)
 
     def _seconds(self, value: Any) -> float:
         seconds = float(value)
-        self._require(isfinite(seconds) and seconds >= 0, "seconds that are none")
+        self._require(isfinite(seconds) and seconds >= 0, "invalid seconds")
         return seconds
 
     def _flags(self, flags: Any) -> dict[str, str]:

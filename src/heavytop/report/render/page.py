@@ -274,7 +274,7 @@ def render(template: str, **context: Any) -> str:
 _ERROR_ALONG = Quantity(SOLUTION_ERROR, "along")
 _LOST = 3
 """Most motions that a headline names as having lost all digits."""
-_HOW = {"exponential": "exponentially", "bounded": "within a bound", "unresolved": "by no law that is resolved"}
+_HOW = {"exponential": "exponentially", "bounded": "within a bound", "unresolved": "by no resolved law"}
 
 
 def digits_headline(rows: Sequence[Row]) -> Headline | None:

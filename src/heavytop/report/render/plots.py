@@ -118,7 +118,7 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
             "A shaded band is the range over which rounding noise alone moves a curve. A curve without the name of an "
             "integrator is heyoka's.",
         ],
-        columns=["case", "run", "quantity", "largest", "last |t|", "last", "law", "exponent", "digits gone at |t|"],
+        columns=["case", "run", "quantity", "largest", "last |t|", "last", "law", "exponent", "digits lost at |t|"],
         place=30,
     )
     preferred = set(first)
@@ -161,7 +161,7 @@ def _chart(section: Section, case: str, column: _Column, members: Sequence[tuple
     if not axes.lines:
         return None
     if lacking and column is _COLUMNS[-1]:
-        section.notes.append(f"{clip(case, 40)}: no known motion reaches as far as {', '.join(lacking)} ran.")
+        section.notes.append(f"{clip(case, 40)}: no reference extends as far as {', '.join(lacking)} ran.")
     return chart
 
 
@@ -169,7 +169,7 @@ def _curve(section: Section, chart: _Chart, case: str, key: Key, row: Row, quant
     """Draws one run with its noise and its law, and adds it to the table."""
     x, y = points(series, (1 - row.bits) * math.log10(2))
     if not x:
-        chart.alternative.append(f"{key.label}: nothing that the reference resolves, or exactly 0.")
+        chart.alternative.append(f"{key.label}: below the resolution of the reference, or exactly 0.")
         return
     draw(chart.axes, section.key(key), x, y)
     if quantity.name == DRIFT:
@@ -377,7 +377,7 @@ def draw_report(report: Report, directory: Path, kinds: Kinds) -> list[Path]:
     """Writes two files per picture of the page into ``directory``; raises InputError without pictures."""
     pictures = [(section, picture) for section in sections([("", report)], kinds) for picture in section.pictures]
     if not pictures:
-        raise InputError("The report has no row that is drawn.", "`heavytop run --plan smoke` makes some.")
+        raise InputError("The report has no rows to draw.", "`heavytop run --plan smoke` measures some.")
     directory.mkdir(parents=True, exist_ok=True)
     return [file for section, picture in pictures for file in _save(section, picture, directory / picture.name)]
 

@@ -183,10 +183,10 @@ def _counted(rows: Iterable[Row]) -> list[str]:
 
 _BUILT_IN = (HEYOKA, MULTIWORD)
 _MEANS = {
-    "t^0.5": "less than rounding noise that adds up",
-    "t": "a frequency that is off by a constant, by truncation or a wrong coefficient",
-    "t^1.5": "rounding noise alone, the least there is",
-    "t^2": "every step errs in the same way and a first integral drifts; a smaller step or tolerance helps",
+    "t^0.5": "less than accumulated rounding noise",
+    "t": "a constant frequency error, from truncation or a wrong coefficient",
+    "t^1.5": "rounding noise alone, the smallest possible",
+    "t^2": "every step has the same error and a first integral drifts; a smaller step or tolerance helps",
     "exponential": "the motion amplifies every error",
 }
 """Laws of the error along the flow."""
