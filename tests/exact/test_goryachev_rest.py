@@ -64,6 +64,13 @@ def test_motions_that_tend_to_rest_are_elementary(start):
     assert reference(TOP, start, [1], 20).method.startswith("closed form: Goryachev")
 
 
+def test_an_attitude_beyond_reach_is_refused_with_what_its_closed_form_lacks():
+    top, start = HeavyTop(TOP.inertia, 250 * TOP.weight, TOP.centre), State((3, 4, 0), (F(4, 5), F(-3, 5), 0))
+    assert "h = a" in reference(top, start, [F(1, 3)], 10, attitude=True).attitude_method
+    with pytest.raises(OutOfReach, match=r"at t = 1e\+06\. The azimuth of M is not known for h = a\."):
+        reference(top, start, [10**6], 10, attitude=True)
+
+
 @pytest.mark.slow
 def test_the_enclosure_holds_the_attitude_over_several_rests():
     """The body rests again every 4 K(m)/√a, some 7 units of time."""

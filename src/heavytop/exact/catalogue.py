@@ -168,19 +168,21 @@ def state_and_attitude(
     """The method of the attitude of ``solution``, and a function of (time, bits) that returns Ω, γ, ξ.
 
     ξ starts at ``initial_xi`` of γ.  It comes from the closed form where that yields ``bits`` bits at the time
-    ``latest``, else from the validated enclosure within the effort; Ω and γ come from the closed form wherever there is
-    one.  The function raises OutOfReach where the bits cannot be proven, InputError for an enclosure of |γ| ≠ 1.
+    ``latest``, else from the validated enclosure within the effort, which says why; Ω and γ come from the closed form
+    wherever there is one.  The function raises OutOfReach where the bits cannot be proven, InputError for an enclosure
+    of |γ| ≠ 1.
     """
     if isinstance(solution, Validated):
         return solution.method, solution.with_attitude
     attitude: Attitude | None = getattr(solution, "own_attitude", getattr(solution, "attitude", None))
+    level = ""
     if attitude is not None:
         from_initial_xi = Turned(solution, attitude)
         try:
             from_initial_xi(latest, bits)
-        except (NotInClass, OutOfReach):
-            pass
+        except (NotInClass, OutOfReach) as error:
+            level = error.cause
         else:
             return solution.method, from_initial_xi
-    enclosure = Validated(solution.top, solution.start, solution.system, effort=effort)
+    enclosure = Validated(solution.top, solution.start, solution.system, effort=effort, level=level)
     return enclosure.method, lambda time, bits: [*solution.state(time, bits), *enclosure.attitude(time, bits)]
