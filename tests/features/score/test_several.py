@@ -45,6 +45,23 @@ def test_one_resolved_error_gives_no_order(second: float | None, third: float | 
     assert list(orders([scored("b", "1/20", second), scored("c", "1/40", third)])) == []
 
 
+def test_the_order_is_of_steps_with_which_the_error_falls_and_of_errors_of_the_method() -> None:
+    """Of two methods without a name, of a run in degrees, of one that ended early, and of rounding in single."""
+    euler, rk4 = [("e1", "1/100", 0.05), ("e2", "1/200", 0.025)], [("a", "1/20", 4e-5), ("b", "1/40", 2.5e-6)]
+    (found,) = orders([scored(*file) for file in (*euler, *rk4)])
+    assert (found.paths, round(found.order, 9)) == (("e1", "e2"), 1)
+    fine = scored("fine", "1/80", 0.5)
+    for wrong in (
+        fine,
+        replace(fine, error=1e-9, explained="omega_in_degrees: ..."),
+        replace(fine, error=1e-9, exit_code=3),
+    ):
+        found_here = list(orders([*(scored(*file) for file in rk4), wrong]))
+        assert [order.paths for order in found_here] == [("a", "b")] * (wrong is not fine)
+    single = [replace(scored(name, step, 1e-6), eps=Fraction(1, 2**23)) for name, step in (("a", "1"), ("b", "1/2"))]
+    assert list(orders(single)) == []
+
+
 @pytest.mark.parametrize(("codes", "whole"), [((0, 0), 0), ((0, 3), 3), ((1, 3), 1), ((2, 1), 2)])
 def test_the_exit_code_is_the_gravest(codes: tuple[int, ...], whole: int) -> None:
     assert exit_code([scored("a", "1", 1.0, code=code) for code in codes]) == whole
@@ -67,7 +84,7 @@ def test_files_are_scored_in_parallel_and_a_bad_one_does_not_stop_the_others(tmp
     assert [each["file"] for each in document["files"]] == paths
     assert [each.get("passed") for each in document["files"]] == [False, None, True]
     assert document["files"][0]["digits_right"] == pytest.approx(4, abs=0.1)
-    assert "no row below its header" in document["files"][1]["error"]
+    assert "no rows below its header" in document["files"][1]["error"]
     (order,) = document["orders"]
     assert order["order"] == pytest.approx(2, abs=0.01)
 

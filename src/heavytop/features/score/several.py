@@ -31,7 +31,7 @@ class ScoredFile:
     """A file with its score, or why it is missing.
 
     method: equal for files that differ only in their step; step: 0 where the file does not state it.
-    required: whether it has the digits that were required, in a sentence.
+    required: whether it has the digits that were required, in a sentence.  eps: of its format.
     """
 
     path: str
@@ -43,11 +43,15 @@ class ScoredFile:
     step: Fraction = Fraction(0)
     error: float | None = None
     required: str = ""
+    eps: Fraction = DOUBLE.eps
 
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """The order between the two finest steps whose errors are more than rounding; paths: from coarse to fine."""
+    """The order between the two finest steps whose errors are more than rounding.
+
+    paths: from coarse to fine, of the steps with which the error falls.
+    """
 
     paths: tuple[str, ...]
     order: float
@@ -80,22 +84,26 @@ def _scored_file(path: str, case: str | None, require: str | None, normalize: bo
     required = "" if needed is None else requirement(score.row, needed, motion.cut)
     metric = score.row.metrics.get(RELATIVE.text)
     largest = None if metric is None or metric.log10 is None else float(metric)
-    return ScoredFile(path, document, score.exit_code, digits, said, method, step, largest, required)
+    eps = motion.precision.eps
+    return ScoredFile(path, document, score.exit_code, digits, said, method, step, largest, required, eps)
 
 
 def orders(files: Sequence[ScoredFile]) -> Iterator[Order]:
-    """The order of each method of which two files with different steps have an error that is more than rounding."""
-    with_step = sorted((file for file in files if file.step), key=lambda file: (file.method, -file.step))
-    for _, group in groupby(with_step, key=lambda file: file.method):
+    """The order of each method of which two files with different steps have an error that is more than rounding.
+
+    A run that ended early, and one whose error has another explanation than its method, shows no order.
+    """
+    whole = (file for file in files if file.step and not file.explained and file.exit_code != ExitCode.INCOMPLETE)
+    for _, group in groupby(sorted(whole, key=lambda file: (file.method, -file.step)), key=lambda file: file.method):
         series = list(group)
-        resolved = [file for file in series if file.error is not None and file.error > _ABOVE_ROUNDING * DOUBLE.eps]
-        pairs = [(a, b) for a, b in pairwise(resolved) if a.step != b.step]
-        if pairs:
-            coarse, fine = pairs[-1]
-            assert coarse.error is not None
-            assert fine.error is not None
-            order = log2(coarse.error / fine.error) / log2(coarse.step / fine.step)
-            yield Order(tuple(file.path for file in series), order)
+        errors = [(file, file.error) for file in series if file.error and file.error > _ABOVE_ROUNDING * file.eps]
+        pairs = [(a, b) for a, b in pairwise(errors) if a[0].step != b[0].step]
+        rising = next((at for at, (a, b) in enumerate(reversed(pairs)) if a[1] <= b[1]), len(pairs))
+        if rising:
+            (coarse, error), (fine, least) = pairs[-1]
+            order = log2(error / least) / log2(coarse.step / fine.step)
+            first = series.index(pairs[-rising][0][0])
+            yield Order(tuple(file.path for file in series[first:]), order)
 
 
 def text(files: Sequence[ScoredFile]) -> str:
