@@ -270,6 +270,16 @@ def test_near_misses_stay_silent() -> None:
     assert found(top, start, times, y + 0.01 * np.outer([float(t) for t in times], [1, 0, 0, 0, 0, 0])) == []
 
 
+def test_large_columns_that_a_factor_makes_smaller_are_not_explained_by_it() -> None:
+    """M in thousandths of its unit in place of Ω: a thousandth of it has the size of Ω, and is another vector."""
+    _, start, times = problem(6)
+    top = HeavyTop((Fraction(13, 10), Fraction(6, 5), 1), 1, (Fraction(1, 3), Fraction(1, 5), Fraction(1, 4)))
+    states = runge_kutta(top, start, times)
+    assert found(top, start, times, states * [1300, 1200, 1000, 1, 1, 1]) == []
+    (told,) = found(top, start, times, states * [1000, 1000, 1000, 1, 1, 1])
+    assert told.kind == "omega_scaled"
+
+
 def test_one_state_that_is_off_is_pointed_at() -> None:
     top, start, times = problem(8)
     y = runge_kutta(top, start, times)

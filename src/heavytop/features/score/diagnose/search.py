@@ -35,6 +35,8 @@ FITTED_DROP = 1000.0
 """... and for one whose numbers were fitted; ..."""
 LIKELY_DROP = 30.0
 """... by this factor one without a free number is likely."""
+_LARGE = 10.0
+"""A larger error counts as this one: columns of any large numbers lose as much if something makes them smaller."""
 _NOTHING = 0.5
 """A hypothesis that leaves a larger error explains nothing, however large the error is without it."""
 FIRST = (6, 2)
@@ -141,7 +143,8 @@ class Search(ABC):
         looked = len(self.file_errors) if looked is None else looked
         lefts = [(hypothesis, hypothesis.left(looked)) for hypothesis in tried]
         lefts = [pair for pair in lefts if pair[1] <= _NOTHING]
-        explained = [(hypothesis, left) for hypothesis, left in lefts if left * hypothesis.least_fall(drop) <= error]
+        most = min(error, _LARGE)
+        explained = [(hypothesis, left) for hypothesis, left in lefts if left * hypothesis.least_fall(drop) <= most]
         if not explained:
             return None
         best = min(max(left, FLOOR) for _, left in explained)
