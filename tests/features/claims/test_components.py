@@ -201,6 +201,12 @@ def test_there_is_a_state_on_the_conditions(
     assert audited(CIRCLE | table).verdict == verdict
 
 
+def test_a_start_is_refuted_at_the_time_0() -> None:
+    report = audited(CIRCLE | {"component": CIRCLE["component"] | {"value": "cos(t + 1)"}})
+    witnesses = [row.witness["t"] for row in report.rows if row.equation == "start" and row.witness]
+    assert witnesses == ["0", "0"]
+
+
 SEED: dict[str, Any] = {
     "kind": "component",
     "parameters": {"C1": "1/6"},  # with Ω = (1/3, 0, 0) on both conditions

@@ -289,7 +289,8 @@ class UserComponent(UserIntegral):
         formulas = Formulas(regular, value.needs | along | self.context.needs)
 
         def made(equation: str, index: int, residual: sympy.Expr, text: str, extra: Formulas = formulas) -> Statement:
-            return Statement(equation, index, "smooth", domain, residual, text, extra)
+            times = replace(domain, points=(Fraction(0),)) if equation == "start" else domain
+            return Statement(equation, index, "smooth", times, residual, text, extra)
 
         equations = [
             made("component", 1, first**2 - f.xreplace({u: c}), "u'^2 = f(u) of the function of t"),
