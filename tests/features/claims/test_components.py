@@ -90,18 +90,24 @@ def test_rates_of_angles_are_claims_by_themselves(psi: str, verdict: str) -> Non
 
 
 @pytest.mark.parametrize(
-    ("value", "verdict"), [("sn(t, 1/3)", "holds"), ("-sn(t, 1/3)", "refuted"), ("sn(t, 1/9)", "refuted")]
+    ("p", "value", "verdict"),
+    [
+        ("1", "sn(t, 1/3)", "holds"),
+        ("1", "-sn(t, 1/3)", "refuted"),
+        ("1", "sn(t, 1/9)", "refuted"),
+        ("sqrt(3)", "sqrt(3)*tanh(t)", "holds"),
+    ],
 )
-def test_eulers_component_obeys_its_quartic(value: str, verdict: str) -> None:
-    """Ω2 of I = (1, 2, 3) from Ω = (1, 0, 1): Ω1² = 1 − u², Ω3² = 1 − u²/3, u' = Ω1 Ω3."""
+def test_eulers_component_obeys_its_quartic(p: str, value: str, verdict: str) -> None:
+    """Ω2 of I = (1, 2, 3) from Ω = (p, 0, 1): Ω1² = p² − u², Ω3² = 1 − u²/3, u' = Ω1 Ω3."""
     table = {
         "kind": "component",
         "top": top("1 2 3", "0 0 0", "0"),
-        "start": {"omega": ["1", "0", "1"], "gamma": ["0", "0", "1"]},
+        "start": {"omega": [p, "0", "1"], "gamma": ["0", "0", "1"]},
         "component": {
             "quantity": "Omega2",
             "constants": ["Omega1^2 + 4*Omega2^2 + 9*Omega3^2"],
-            "reduced": "(1 - u^2)*(1 - u^2/3)",
+            "reduced": f"({p}^2 - u^2)*(1 - u^2/3)",
             "value": value,
         },
     }

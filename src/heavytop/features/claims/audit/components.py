@@ -169,9 +169,9 @@ class UserComponent(UserIntegral):
         squares = [s for s in on_state if s.equation == "reduced"]
         states, base = self.at_states, setting_of(self.context, self._u)
         # where u is constant, u'^2 = f(u) does not imply u'' = f'(u)/2
-        moving = [s for s in states.samples if self._moves(system, s) and _is_at(s, states.relations)]
-        yield in_u, replace(base, samples=tuple(s for s in base.samples if any(s.items() <= m.items() for m in moving)))
-        yield squares, replace(states, samples=tuple(moving))
+        moving = [s for s in base.samples if self._moves(system, s)]
+        yield in_u, replace(base, samples=tuple(filter(self._is_on_conditions, moving)))
+        yield squares, replace(states, samples=tuple(s for s in states.samples if self._moves(system, s)))
         yield [s for s in on_state if s.equation != "reduced"], self.at_states
         yield self._in_time(system), setting_of(self.context, TIME)
 
@@ -195,6 +195,13 @@ class UserComponent(UserIntegral):
         first = rate(self.quantity.expression)
         zeros = [is_exactly_zero(self._at_start(e), sample) for e in (first, rate(first))] if self.start else [False]
         return any(zero is False for zero in zeros)
+
+    def _is_on_conditions(self, sample: Mapping[sympy.Symbol, Fraction]) -> bool:
+        """Whether the start lies on the conditions at a sample; without a start, whether a known state does."""
+        if self.start:
+            return _is_at(sample, map(self._at_start, (*(part.expression for part in self.where), OFF_SPHERE)))
+        states = (state for state in self.at_states.samples if sample.items() <= state.items())
+        return any(_is_at(state, self.at_states.relations) for state in states)
 
     def _reduced(self, system: System) -> tuple[list[Statement], list[Statement]]:
         """u'² = f(u), u'' = f'(u)/2 and the rates of the angles, where the first integrals have their values."""
