@@ -17,6 +17,7 @@ import numpy
 import pytest
 from flint import arb, ctx
 
+from heavytop import events
 from heavytop.cases import CASES
 from heavytop.exact.cases.euler import Euler
 from heavytop.exact.cases.lagrange import Lagrange
@@ -115,9 +116,28 @@ def words_of_mpmath(index: int) -> Any:
     return run_peer("mpmath:odefun", *some_top(index % 2), [F(1, 4)], real((60, 100, 140)[index % 3])).texts()
 
 
+def enclosed(index: int) -> Any:
+    return [(midpoint(x), radius(x)) for x in Validated(*some_top(1)).state(F(20 + index, 3), 100)]
+
+
+def varied(index: int) -> Any:
+    return reference(*some_top(index), [F(1)], 20, derivatives="start").derivatives
+
+
+def located(index: int) -> Any:
+    """Events on the way, within which others are looked for."""
+    inner = partial(events, *some_top(1), 1, "gamma2")
+    found = (
+        events(*some_top(1), 9, text, digits=20).time_texts() for text in ("gamma3 = 1/2", "omega1*gamma2")[index:]
+    )
+    return [*found, events(*some_top(1), 2, lambda omega, gamma: omega[0] + 0 * len(inner())).time_texts()]
+
+
 def calls() -> list[Callable[[], Any]]:
     """Calls of every kind; those that share an engine or a lattice are many, and differ in precision."""
     found: list[Callable[[], Any]] = [carried, *[ensemble] * 2]
+    for index in range(2):
+        found += [partial(each, index) for each in (enclosed, varied, located)]
     for index in range(24):
         found += [
             partial(propagated, index, FORMATS[index % 4]),

@@ -291,9 +291,3 @@ def test_the_warning_names_the_principal_moments_that_break_what_a_diagonal_keep
     (text,) = body.warnings()
     assert re.search(r"exceeds the sum 0\.\d{1,6}|principal moments", text)
     assert "/" not in text
-
-
-def test_python_warns_where_the_command_does() -> None:
-    top, start = ht.HeavyTop((5, 1, 1), 0, (0, 0, 0)), ht.State((1, 0, 0), (0, 0, 1))
-    with pytest.warns(UserWarning, match="I1 = 5 exceeds the sum 2 of the other two"):
-        ht.reference(top, start, [1], digits=5)

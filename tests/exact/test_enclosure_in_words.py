@@ -1,6 +1,5 @@
 """Enclosures in words hold the motion: against exact integers of more bits, over systems, scales and threads."""
 
-from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from functools import partial
 from random import Random
@@ -11,7 +10,7 @@ from heavytop import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Contradiction, HeavyTo
 from heavytop.exact.enclosure import run
 from heavytop.exact.enclosure.run import ScaledMotion, Validated
 from heavytop.exact.enclosure.step import start_node, step
-from heavytop.exact.flint.balls import midpoint, radius, relative_bits
+from heavytop.exact.flint.balls import relative_bits
 from heavytop.multiword.fixed_point import fixed_point_run
 from heavytop.multiword.fixed_point.certified_series import CertifiedSeries, WordSeries
 from heavytop.top.equations import Parameters
@@ -85,22 +84,6 @@ def assert_held(monkeypatch, make, what, time, bits):
     assert min(map(relative_bits, balls)) >= bits
     for solution, in_words in ((one, True), (other, False)):
         assert any(words for _, _, words, _ in solution._runs) is in_words
-
-
-@pytest.mark.slow
-def test_threads_find_the_same_balls():
-    times = [Fraction(n, 3) for n in range(20, 32)]
-
-    def found(time):
-        return [(midpoint(b), radius(b)) for b in Validated(TOP, START).state(time, 100)]
-
-    with ThreadPoolExecutor(4) as pool:
-        together = list(pool.map(found, times))
-    assert together == [found(time) for time in times]
-    shared = Validated(TOP, START)
-    with ThreadPoolExecutor(4) as pool:
-        at_once = list(pool.map(lambda time: [(midpoint(b), radius(b)) for b in shared.state(time, 100)], times))
-    assert at_once == together
 
 
 def test_a_field_that_the_lanes_do_not_compute_goes_to_integers():

@@ -145,15 +145,6 @@ def test_a_body_at_rest_is_set_turning_by_its_weight_alone_and_a_rotor_alone_lea
     assert find(falling, still, HEAVY_GYROSTAT).method.startswith("validated")
 
 
-def test_integrals_are_those_of_the_system_that_the_top_tells() -> None:
-    top, start = HeavyTop((3, 2, 1), 0, (0, 0, 0), (0, 0, 1)), CASES["euler"].start
-    names = [integral.name for integral in ht.holding(top, start)]
-    assert names == [integral.name for integral in ht.holding(top, start, HEAVY_GYROSTAT)]
-    assert names[:4] == ["gamma_squared", "area", "energy", "momentum_squared"]
-    with pytest.raises(InputError, match="rotor"):
-        ht.holding(top, start, ht.HEAVY_TOP)
-
-
 def test_a_motion_that_turns_by_its_rotor_alone_is_refused_beyond_reach() -> None:
     """1e13 turns: the rotor's rate counts, though Ω is small."""
     top = HeavyTop((1, 1, 2), 0, (0, 0, 0), ("1e13", 0, 0))

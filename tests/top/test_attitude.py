@@ -11,7 +11,7 @@ import pytest
 
 from heavytop import Attitude, InputError
 from heavytop.exact.flint.balls import FUNCTIONS, ball, working_precision
-from heavytop.precision import cross, dot
+from heavytop.precision import cross
 from heavytop.top.attitude import (
     SEQUENCES,
     attitude_from_angles,
@@ -20,7 +20,6 @@ from heavytop.top.attitude import (
     matrix_of_quaternion,
     multiplied,
     quaternion_of_rows,
-    rotated,
     rows_of,
     rows_of_euler,
     signs,
@@ -46,22 +45,6 @@ def test_r_of_a_rational_quaternion_of_any_length_is_a_rational_rotation() -> No
         assert multiplied(rows, transposed(rows)) == IDENTITY
         assert rows[1] == cross(rows[2], rows[0])  # eta = gamma x xi
         assert rows_of(rows[2], rows[0]) == rows
-
-
-def test_a_quaternion_turns_vectors_as_its_product_does() -> None:
-    """q v q̄ by the multiplication of quaternions, exactly."""
-
-    def times(p: Any, q: Any) -> tuple[Any, ...]:
-        a, u, b, v = p[0], p[1:], q[0], q[1:]
-        w = cross(u, v)
-        return (a * b - dot(u, v), *(a * v[i] + b * u[i] + w[i] for i in range(3)))
-
-    random = Random(2)
-    for _ in range(20):
-        q = random_quaternion(random)
-        v = tuple(Fraction(random.randint(-9, 9)) for _ in range(3))
-        turned = times(times(q, (Fraction(0), *v)), (q[0], *(-value for value in q[1:])))
-        assert turned == (0, *rotated(matrix_of_quaternion(q), v))
 
 
 def test_quaternions_come_back_whichever_component_is_the_largest() -> None:

@@ -6,7 +6,6 @@ from random import Random
 import mpmath
 import pytest
 import sympy
-from flint import arb, fmpq
 
 from heavytop.exact.flint.balls import ball, working_precision
 from heavytop.integrate.heyoka.engines import expressions
@@ -78,14 +77,6 @@ def test_the_attitude_vector_turns_with_the_body_s_own_angular_velocity() -> Non
     for system in (HEAVY_TOP, HEAVY_GYROSTAT):
         assert system.attitude(p._replace(rotor=vector(random)), y, xi) == cross(xi, y[:3])
     assert GYROSTAT.attitude(p, y, xi) == cross(xi, (y[0], y[1] + p.rotor, y[2]))
-
-
-def test_a_rational_ball_contains_its_number() -> None:
-    with working_precision(64):
-        third = ball(Fraction(1, 3))
-        assert arb(fmpq(1, 3)).overlaps(third)
-        assert not third.is_exact()
-        assert ball(Fraction(3, 8)).is_exact()
 
 
 def test_a_system_from_another_process_is_the_same_object() -> None:

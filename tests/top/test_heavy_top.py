@@ -24,14 +24,6 @@ def test_moments_that_are_not_positive_are_refused(inertia) -> None:
         HeavyTop(inertia, 1, (0, 0, 1))
 
 
-@pytest.mark.parametrize("values", [(1, 2), (1, 2, 3, 4), ()])
-def test_a_vector_has_three_numbers(values) -> None:
-    with pytest.raises(InputError, match="numbers"):
-        HeavyTop(values, 1, (0, 0, 1))
-    with pytest.raises(InputError, match="omega must have 3 numbers"):
-        State(values, (0, 0, 1))
-
-
 def test_moments_that_no_body_has_are_a_warning_only() -> None:
     assert HeavyTop((1, 1, 3), 1, (0, 0, 1)).warnings() == [
         "I3 = 3 exceeds the sum 2 of the other two: no rigid body has such moments."

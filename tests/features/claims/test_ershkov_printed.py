@@ -76,18 +76,6 @@ def test_the_two_printings_of_a_phi_and_theta_agree() -> None:
         assert ershkov.theta(c, u, FUNCTIONS).overlaps(ershkov.theta_of_6_1(c.alpha, u, FUNCTIONS))
 
 
-def test_the_partial_case_satisfies_the_relations_of_4_1() -> None:
-    random = Random(3)
-    for _ in range(20):
-        case = random_case(random)
-        top, start = case.solves.top, case.solves.start
-        c0 = sum(m * g for m, g in zip(top.angular_momentum(start.omega), start.gamma, strict=True))
-        assert c0**2 == 2 * case.i3 * case.c1
-        assert (2 * case.i1 * case.c1 - c0**2) / case.i1**2 == case.alpha * 2 * top.moment[1] / c0
-        assert 2 * top.moment[1] / c0 == case.alpha * (case.i1 - case.i3) / case.i3
-        assert top.moment[1] == case.c1 * (case.i1 - case.i3) / case.i1
-
-
 @pytest.mark.parametrize("ratio", [2, 6])
 def test_printed_psi_in_double_has_under_four_digits_at_36_and_none_from_38(ratio: int) -> None:
     case = {2: TWO, 6: SIX}[ratio]

@@ -1,7 +1,6 @@
 """Derivatives from Python and from the command line: shapes, guards, what a Jacobian is worth, and its conventions."""
 
 import json
-from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from functools import partial
 
@@ -186,15 +185,3 @@ def test_derivatives_of_a_body_are_in_the_axes_given(place):
     ):
         for value, row in zip(values, matrix[0], strict=True):
             assert abs(value - Fraction(row[column].value)) < Fraction(1, 10**22)
-
-
-@pytest.mark.slow
-def test_threads_that_ask_at_once_get_what_each_gets_alone():
-    starts = [ht.State(("1/10", Fraction(k, 5), "9/10"), ("3/5", 0, "4/5")) for k in range(3)]
-
-    def ask(start):
-        return ht.reference(TOP, start, [1], 20, derivatives="start").derivatives
-
-    alone = [ask(start) for start in starts]
-    with ThreadPoolExecutor(3) as pool:
-        assert list(pool.map(ask, starts)) == alone

@@ -4,7 +4,6 @@ import itertools
 import math
 import random
 from fractions import Fraction
-from threading import Thread
 
 import mpmath
 import numpy as np
@@ -383,25 +382,6 @@ def test_what_is_out_of_reach_says_so() -> None:
         ht.events(TOP, START, 10**12)
     with pytest.raises(OutOfReach, match="Computed ones reach further"):
         ht.events(TOP, START, 10**7, digits=20)
-
-
-@pytest.mark.slow
-def test_threads_and_their_callables_do_not_disturb_each_other() -> None:
-    alone = [ht.events(TOP, START, 20, f, digits=20).time_texts() for f in FUNCTIONS[:2]]
-    found: dict[int, list[str]] = {}
-
-    def work(place: int) -> None:
-        found[place] = ht.events(TOP, START, 20, FUNCTIONS[place % 2], digits=20).time_texts()
-
-    threads = [Thread(target=work, args=(k,)) for k in range(4)]
-    for step in (Thread.start, Thread.join):
-        for thread in threads:
-            step(thread)
-    assert [found[k] for k in range(4)] == alone * 2
-    inside = ht.events(
-        TOP, START, 3, lambda omega, gamma: float(ht.events(TOP, START, 1, "gamma2").steps) * 0 + omega[0]
-    )
-    assert inside.guarantee == "polynomial" or len(inside) >= 0
 
 
 def test_a_section_of_several_starts() -> None:
