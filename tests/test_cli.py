@@ -76,7 +76,6 @@ def test_a_run_that_stops_early_is_incomplete_and_keeps_what_it_reached() -> Non
 @pytest.mark.parametrize(
     ("changes", "more", "message"),
     [
-        ({"inertia": "3,2"}, [], "--inertia has 2 numbers"),
         ({"omega": "1,x,2"}, [], "--omega: 'x' is not a finite number"),
         ({"gamma": "1,1,0"}, [], "--normalize"),
         ({"gamma": "0,0,0"}, ["--normalize"], "must not be zero"),
@@ -86,11 +85,9 @@ def test_a_run_that_stops_early_is_incomplete_and_keeps_what_it_reached() -> Non
         ({}, ["--max-steps", "0"], "--max-steps must be at least 1; got 0"),
         ({}, ["--integrator", "splitting:2", "--max-steps", "5"], "splitting:2 has no --max-steps"),
         ({}, ["--integrator", "splitting:4", "--tolerance", "1e-9"], "Leave it out: --step sets the accuracy"),
-        ({}, ["--step", "1/9"], "Leave it out: --tolerance sets the accuracy of heyoka"),
         ({}, ["--quaternion", "1,0,0,0", "--matrix", "1,0,0,0,1,0,0,0,1"], "--quaternion and --matrix were given"),
         ({}, ["--mass", "2"], "--weight and --mass were given"),
         ({}, ["--colour", "red"], "--colour"),
-        ({"omega": "1e400,0,0"}, [], "too large"),
         ({"times": "1e5000,1e5000"}, [], "too large"),
         ({"inertia": "-1e5000,1,1"}, [], "must be positive"),
     ],
@@ -258,12 +255,6 @@ def test_help_lists_the_commands_and_loads_nothing_heavy() -> None:
     assert done.stdout.splitlines()[-1] == "set()"
 
 
-def test_list_names_cases_plans_systems_and_formats() -> None:
-    words = ("ershkov-partial-6", "kovalevskaya", "default", "gyrostat", "real:BITS", "113 bits", "scipy:DOP853")
-    text = printed("list")
-    assert [word for word in words if word not in text] == []
-
-
 def test_reference_gives_proven_values_that_enclose_the_vectors() -> None:
     given = VECTORS[0]
     answer = json.loads(printed("reference", *options(times="1,8"), "--digits", "60", "--json"))
@@ -291,7 +282,6 @@ def test_reference_of_the_gyrostat_uses_its_closed_form() -> None:
         ({"times": "inf"}, [], 2, "not a finite number"),
         ({"gamma": "1,1,1"}, [], 2, "--normalize"),
         ({"times": "1e6"}, [], 3, "digit"),
-        ({"times": "1e400"}, [], 2, "too large"),
         ({"weight": "1" * 5000}, [], 3, "No digit at t"),
     ],
 )

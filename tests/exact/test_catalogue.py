@@ -2,10 +2,12 @@
 
 import re
 from fractions import Fraction
+from types import SimpleNamespace
 
 import pytest
 
 from heavytop import GYROSTAT, HEAVY_GYROSTAT, HeavyTop, InputError, OutOfReach, State
+from heavytop.errors import NotInClass
 from heavytop.exact.cases.bobylev_steklov import BobylevSteklov
 from heavytop.exact.cases.delone import Delone, DeloneHomoclinic
 from heavytop.exact.cases.dokshevich import Dokshevich
@@ -180,3 +182,10 @@ def test_a_rotor_without_momentum_leaves_the_closed_forms_of_the_heavy_top(case)
     turned = HeavyTop(*data, (0, F(1, 10**9), 0))
     kept = {type(each).__name__ for each in matches(turned, motion.start, HEAVY_GYROSTAT)}
     assert kept <= {"ZhukovskyVolterra", "Staude", "LagrangeGyrostat", "Renamed"}
+
+
+def test_a_renamed_motion_without_attitude_says_so():
+    known = SAMPLES[BobylevSteklov]
+    alone = SimpleNamespace(method="state alone", top=known.top, start=known.start, system=known.system)
+    with pytest.raises(NotInClass, match="has no attitude"):
+        Renamed(alone, (1, 2, 0)).attitude(F(1), 50)

@@ -11,7 +11,6 @@ from heavytop.features.homoclinic.break_away_law import break_away_law
 from heavytop.harness.rows import Task
 from heavytop.integrate import registry
 from heavytop.integrate.heyoka import motions
-from heavytop.precision import time_text
 from support.reports import expand, load, measure
 
 TASKS = expand(load("default")[0])
@@ -87,11 +86,3 @@ def test_a_run_that_fails_is_a_row_with_its_outcome(monkeypatch: pytest.MonkeyPa
     assert row.finite is False
     assert row.time_reached == "0"
     assert {(metric.value, metric.band) for metric in row.metrics.values()} == {("missing", None)}
-
-
-@pytest.mark.parametrize(
-    ("time", "text"),
-    [(Fraction(1, 10), "0.1"), (Fraction(100000), "100000"), (Fraction(0), "0"), (Fraction(-5, 4), "-1.25")],
-)
-def test_times_are_printed_plainly(time: Fraction, text: str) -> None:
-    assert time_text(time) == text

@@ -13,7 +13,6 @@ from heavytop.precision import exact
 from heavytop.records import Against, Data, Law, Metric, Row, Series
 from heavytop.report.compare.noise import Policy, Rule, Timings
 from heavytop.report.compare.verdicts import judge_seconds
-from heavytop.report.document.document import short
 from support.reports import compare, replace, store
 from support.small_reports import all_judged, error, judged, report, row, verdicts
 
@@ -265,14 +264,6 @@ def test_a_missing_report_and_a_row_twice_are_refused(tmp_path: Path) -> None:
         ht.compare(report(row()), twice)
     with pytest.raises(InputError, match=r"contains the row .* twice"):
         ht.history([report(row()), twice])
-
-
-@pytest.mark.parametrize(
-    ("value", "expected"),
-    [("1.2345e-997", "1.23e-997"), ("0", "0"), ("nan", "nan"), ("0.1739", "0.1739"), ("-5", "-5")],
-)
-def test_short_numbers_for_tables(value: str, expected: str) -> None:
-    assert short(value) == expected
 
 
 @pytest.mark.parametrize(

@@ -11,13 +11,6 @@ from heavytop.top.heavy_top import require_physical
 from support.helpers import unit_vector, vector
 
 
-def test_numbers_of_every_kind_are_taken_exactly() -> None:
-    top = HeavyTop(("1/3", 2, "0.5"), 0.1, (0, Fraction(1, 7), "1e-2"))
-    assert top.inertia == (Fraction(1, 3), 2, Fraction(1, 2))
-    assert top.weight == Fraction(3602879701896397, 36028797018963968)
-    assert top.moment[1] == top.weight / 7
-
-
 @pytest.mark.parametrize("inertia", [(1, 0, 2), (1, 2, -3), ("1", "2", "-1/9")])
 def test_moments_that_are_not_positive_are_refused(inertia) -> None:
     with pytest.raises(InputError, match=r"I\d must be positive; got"):

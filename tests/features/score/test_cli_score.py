@@ -259,6 +259,8 @@ def test_the_data_of_a_case_can_be_pasted_everywhere(name: str, tmp_path: Path) 
 def test_list_names_everything_once() -> None:
     _, text, _ = command("list")
     assert max(map(len, text.splitlines())) <= 80
+    words = ("default", "gyrostat", "real:BITS", "113 bits", "scipy:DOP853", *CASES)
+    assert [word for word in words if word not in text] == []
     names = re.findall(r"^  (\S+)", text, re.M)
     assert len(names) == len(set(names))
     _, out, _ = command("list", "--json")
