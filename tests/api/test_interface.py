@@ -76,7 +76,7 @@ def test_an_ensemble_is_its_motions_and_every_integrator_has_the_same_call() -> 
     observed = ht.ensemble(tops, START, TIMES, observer=lambda *sample: seen.append(sample))
     assert [len(run.states) for run in observed] == [0, 0]
     assert sorted((index, time) for index, time, _ in seen) == [(i, t) for i in (0, 1) for t in (1, Fraction(5, 2))]
-    with pytest.raises(ht.InputError, match="went to its observer"):
+    with pytest.raises(ht.InputError, match="passed to its observer"):
         ht.drift(observed[0])
 
 

@@ -254,7 +254,7 @@ def test_every_picture_is_a_file_as_svg_and_as_pdf(tmp_path: Path) -> None:
     assert "cyrk:DOP853 tolerance=1e-5" in files[2].read_text("utf-8")
     again = draw_report(report(*growth), tmp_path / "again", KINDS)
     assert [file.read_bytes() for file in again] == [file.read_bytes() for file in files]
-    with pytest.raises(InputError, match="no row that is drawn"):
+    with pytest.raises(InputError, match="no rows to draw"):
         draw_report(report(), tmp_path / "none", KINDS)
     assert not (tmp_path / "none").exists()
 
