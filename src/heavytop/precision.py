@@ -286,9 +286,7 @@ def physical(number: Any, what: str) -> Fraction:
         raise InputError(f"{argument(what)}: {error.cause}", error.remedy) from None
     exponent = value.numerator.bit_length() - value.denominator.bit_length()
     if exponent >= _LARGE_POWER and abs(value) > LARGEST:
-        raise InputError(
-            f"{argument(what)} = {shown(value)} is too large.", "Choose other units: numbers go up to 1e150."
-        )
+        raise InputError(f"{argument(what)} = {shown(value)} is too large.", "Choose other units: at most 1e150.")
     return value
 
 

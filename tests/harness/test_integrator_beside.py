@@ -101,7 +101,7 @@ def test_who_stands_beside_heyoka_is_another_that_is_known(plan: str, tmp_path: 
     audit = '[[measure]]\nkind = "audit"\nclaims = ["ershkov-partial"]\nsystems = ["gyrostat"]\n'
     (tmp_path / "claims").mkdir()
     for name, integrator, cause in (
-        (plan, "heyoka", "that others are compared with"),
+        (plan, "heyoka", "what others are compared with"),
         (plan, "rk4", "Unknown integrator"),
         (plan_file(tmp_path / "claims", audit), "multiword", "does not measure heyoka"),
     ):

@@ -84,7 +84,7 @@ def test_noise_of_the_size_of_the_error_moves_a_top_at_rest(
     (tmp_path / "mine.py").write_text(program)
     contract = integrator_check._Contract(named(f"{tmp_path / 'mine.py'}:solve"))
     found = integrator_check._judged("rest", contract._rest)
-    assert (found.verdict, "its error on a motion explains" in found.text) == (verdict, verdict == "note")
+    assert (found.verdict, "the error on a motion explains" in found.text) == (verdict, verdict == "note")
 
 
 @pytest.mark.slow

@@ -79,7 +79,7 @@ def test_steps_of_a_top_at_rest_are_out_of_reach(tmp_path: Path) -> None:
     steps = '[[measure]]\nkind = "local_error"\ncases = ["rest"]\nprecisions = ["double"]\nhorizon = "1"\n'
     ((_, row),) = rows(tasks_of(tmp_path, f"{rest}gamma = [0, 0, 1]\n{steps}"), 1, None)
     assert (row.outcome, row.metrics) == ("out_of_reach", {})
-    assert row.against == "nothing: rest is an equilibrium, on which integrators take no steps."
+    assert row.against == "nothing: rest is an equilibrium, which takes no steps."
 
 
 def test_a_peer_that_gives_up_is_no_failure_but_a_row_that_came_to_nothing_is_one(tmp_path: Path) -> None:

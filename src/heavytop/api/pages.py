@@ -39,9 +39,7 @@ def _files() -> dict[str, Path]:
     folder = _INSTALLED if _INSTALLED.is_dir() else _CHECKOUT
     paths = {path.stem: path for part in (folder, folder / "tutorials") for path in part.glob("*.md")}
     if not paths:
-        raise InputError(
-            "The pages of the documentation are not installed.", "Install heavytop from a wheel or from its checkout."
-        )
+        raise InputError("The documentation is not installed.", "Install heavytop from a wheel or from its checkout.")
     return {name: path for name, path in paths.items() if name not in _OF_THE_SITE}
 
 

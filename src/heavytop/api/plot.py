@@ -417,9 +417,7 @@ def _writer(suffix: str, fps: int) -> AbstractMovieWriter:
     if suffix != ".mp4":
         raise refusal("A film", ".gif or .mp4", quoted(suffix), "Give a path that ends with .gif or .mp4.")
     if not FFMpegWriter.isAvailable():
-        raise InputError(
-            "Writing .mp4 needs ffmpeg, which is not installed.", "Install ffmpeg, or give a path that ends with .gif."
-        )
+        raise InputError("Writing .mp4 needs ffmpeg.", "Install ffmpeg, or give a path that ends with .gif.")
     return FFMpegWriter(fps=fps)
 
 

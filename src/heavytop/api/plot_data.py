@@ -132,10 +132,7 @@ def _with_attitude(run: Trajectory) -> Trajectory:
         xi=perpendicular(start.gamma),
     )
     if len(again.states) < len(run.states):
-        raise InputError(
-            f"The attitude could not be integrated: {again.outcome.message}.",
-            "Give the run with xi=, as propagate takes.",
-        )
+        raise InputError(f"The attitude could not be integrated: {again.outcome.message}.", "Call propagate with xi=.")
     carried = again if run.frame is None else framed(again, run.frame)
     return replace(run, problem=again.problem, attitude=carried.states[: len(run.states), 6:])
 
@@ -199,9 +196,7 @@ def compared(run: Any, known: Any) -> tuple[Problem, list[Fraction], list[list[F
     samples(known)
     count = len(run.states)
     if count != len(known.states):
-        raise InputError(
-            f"Both runs must have the same times; got {count} and {len(known.states)} samples.", "Give the same times."
-        )
+        raise InputError(f"Both runs must have the same times; got {count} and {len(known.states)}.", "Change one.")
     indices = every(count)
     times = [exact(run.times[index]) for index in indices]
     slack = 4 * run.problem.precision.eps

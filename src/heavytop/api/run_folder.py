@@ -179,9 +179,7 @@ def prepare(
     timeout = of_plan if row_timeout is None else row_timeout
     workers = arguments.count(workers, "workers")
     if workers is not None and scheduler is not None:
-        raise InputError(
-            "--workers and --scheduler exclude each other: a scheduler has its own workers.", "Give one of them."
-        )
+        raise InputError("--workers and --scheduler were given: a scheduler has its own.", "Give one of them.")
     if not save_every >= 0:
         raise refusal("save_every", "0 or more", save_every, "Give seconds, such as 10.")
     if resume and out is None:

@@ -148,9 +148,7 @@ def absolute(path: Path) -> Path:
     try:
         return path.absolute()
     except OSError:
-        raise InputError(
-            f"{path} is relative to a working directory that does not exist any more.", "Change to one that does."
-        ) from None
+        raise InputError(f"{path} is relative to a folder that no longer exists.", "Change folder.") from None
 
 
 @contextmanager

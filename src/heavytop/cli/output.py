@@ -39,9 +39,7 @@ class _Output(io.FileIO):
             raise ReaderGone from None
         except OSError as error:
             cause = _CAUSES.get(error.errno or 0, str(error.strerror))
-            raise OutputError(
-                f"Standard output cannot be written: {cause}.", "Redirect it to a place with space."
-            ) from None
+            raise OutputError(f"Standard output cannot be written: {cause}.", "Redirect it to a file.") from None
 
 
 class _Messages(io.FileIO):

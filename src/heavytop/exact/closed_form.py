@@ -525,7 +525,5 @@ class Renamed:
         """ξ of the solution in the new names.  Raises NotInClass where it has no attitude."""
         attitude = getattr(self.solution, "attitude", None)
         if attitude is None:
-            raise NotInClass(
-                f"{self.method} has no attitude in closed form.", "Integrate the attitude with the motion."
-            )
+            raise NotInClass(f"{self.method} has no attitude in closed form.", "Integrate it with the motion.")
         return permuted(attitude(time, bits), self.axes)

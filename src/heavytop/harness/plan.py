@@ -236,9 +236,7 @@ def with_integrator(plan: Plan, integrator: str | IntegratorSource) -> Plan:
     Raises InputError for an unknown integrator, for heyoka itself and for a plan that measures no integrator.
     """
     if integrator == HEYOKA:
-        raise InputError(
-            f"{HEYOKA} is the integrator that others are compared with.", "Name another with --integrator, or none."
-        )
+        raise InputError(f"{HEYOKA} is what others are compared with.", "Give another --integrator.")
     if not isinstance(integrator, str) and not is_third_party(integrator.name):
         raise InputError(f"The integrator {integrator.name} has the name of a built-in one.", _RENAME)
     require_integrator(integrator)

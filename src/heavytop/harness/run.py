@@ -153,9 +153,7 @@ def _windowed(
             begun(reported := longest)
         finished = wait(in_progress, timeout=_PATIENCE, return_when=FIRST_COMPLETED).done
         if not finished and limit == 0:
-            raise HeavyTopError(
-                "The cluster has lost all its workers.", f"Start some where heavytop is installed.  {RESUME}."
-            )
+            raise HeavyTopError("The cluster has lost all its workers.", f"Start some with heavytop.  {RESUME}.")
         for future in finished:
             yield in_progress[future], future
             del in_progress[future]

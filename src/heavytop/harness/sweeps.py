@@ -73,9 +73,7 @@ class SweepGrid(Strict, tag="grid"):
         size = _bounded(self.name, prod(shape))
         for quantity, axis in zip(_AXES, axes, strict=True):
             if repeated := [value for value, count in Counter(axis).items() if count > 1]:
-                raise InputError(
-                    f"The sweep {self.name} lists the {quantity} {_text(repeated[0])} twice.", "List each value once."
-                )
+                raise InputError(f"The sweep {self.name} has {quantity} {_text(repeated[0])} twice.", "List each once.")
         if not any(isinstance(axis, list) for axis in axes):
             raise InputError(f"The sweep {self.name} varies nothing.", "Give a list of values, or use [[top]].")
 
@@ -115,9 +113,7 @@ class SweepGrid(Strict, tag="grid"):
                 return [vector(value, quantity) for value in values]
             if all(isinstance(part, str) for part in values):
                 return (vector(values, quantity),)
-        raise InputError(
-            f"The sweep {self.name}: {quantity} mixes numbers and lists.", "Give three numbers, or lists of three."
-        )
+        raise InputError(f"The sweep {self.name}: {quantity} mixes numbers and lists.", "Give numbers, or lists.")
 
 
 class Random(Strict, tag="random"):

@@ -158,7 +158,5 @@ def one_kind(problems: Sequence[Problem]) -> Problem:
 
     for index, problem in enumerate(problems):
         if kind(problem) != kind(problems[0]):
-            raise InputError(
-                f"Problem 0 is {kind(problems[0])}, problem {index} is {kind(problem)}.", "Run each kind separately."
-            )
+            raise InputError(f"Problem 0 is {kind(problems[0])}, problem {index} is {kind(problem)}.", "Separate them.")
     return problems[0]

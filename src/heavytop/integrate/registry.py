@@ -723,9 +723,7 @@ def ensemble_propagator(which: str | IntegratorSource, options: dict[str, Any]) 
     integrator = described(which)
     if not integrator.ensemble:
         require(integrator)
-        raise InputError(
-            f"The integrator {integrator.name} does not support ensembles.", "Call propagate for each motion."
-        )
+        raise InputError(f"The integrator {integrator.name} does not support ensembles.", "Propagate each motion.")
     _with(loaded(integrator.function), integrator.name, dict.fromkeys(options.keys() - {"threads"}))  # refuses unknown
     run = _with(loaded(integrator.ensemble), integrator.name, options)
 

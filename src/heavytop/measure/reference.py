@@ -377,9 +377,7 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
         """
         exponents = self._derivatives().lyapunov
         if exponents is None:
-            raise InputError(
-                "This reference has no derivatives with respect to the start.", 'Give derivatives="start" or "all".'
-            )
+            raise InputError("The reference has no derivatives by the start.", 'Give derivatives="start" or "all".')
         return exponents
 
     def _derivatives(self) -> Derivatives:

@@ -245,9 +245,7 @@ def _states(served: Sequence[_WithArithmetic], times: Sequence[Fraction], effort
         states = [[*before[:done], *run.states] for before, run in zip(states, runs, strict=True)]
     for run in runs:
         if run.outcome is not Outcome.SUCCESS:
-            raise OutOfReach(
-                f"A reference run in words of {words} bits {run.outcome.message}.", "Give an earlier time."
-            )
+            raise OutOfReach(f"A reference run in {words} bits {run.outcome.message}.", "Give an earlier time.")
     return states
 
 

@@ -609,9 +609,7 @@ def outputs(text: str, point: Iterable[Any] | None = None, pivot: Iterable[Any] 
     names = [part.strip().partition(":")[0].replace("_", "-").lower() for part in parts]
     for name in names:
         if names.count(name) > 1:
-            raise InputError(
-                f"The output {quoted(name)} is given twice.", "Give each once; Euler angles of one sequence."
-            )
+            raise InputError(f"The output {quoted(name)} is given twice.", "Give each once, with one Euler sequence.")
     if "position" not in names and (point is not None or pivot is not None):
         raise InputError("A point or a pivot was given, but no position was requested.", "Add position to the outputs.")
     if not parts:

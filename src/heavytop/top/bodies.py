@@ -477,9 +477,7 @@ def body_of(data: Mapping[str, Any]) -> Body:
     twice = [key for key in BODY if key in data and key != "gravity"]
     if twice:
         given = argument(twice[0])
-        raise InputError(
-            f"{argument('file')} and {given} were given.", f"The file defines {twice[0]}: leave {given} out."
-        )
+        raise InputError(f"{argument('file')} and {given} were given.", f"The file defines {twice[0]}: omit {given}.")
     return Body.from_file(data["file"], data.get("link"), gravity=data.get("gravity"))
 
 

@@ -374,10 +374,7 @@ def _sdf(name: str, link: Element, inertial: Element, around: _Around) -> BodyIn
             "Write the numbers out: gz sdf --print FILE --expand-auto-inertials > FILE.sdf.",
         )
     if pose is not None and (frame := pose.get("relative_to") or pose.get("frame")):
-        raise InputError(
-            f"{numbers.where}: relative_to {quoted(frame)} of an inertial is not supported.",
-            "Give its pose in the link.",
-        )
+        raise InputError(f"{numbers.where}: an inertial has relative_to {quoted(frame)}.", "Give its pose in the link.")
     axes, centre = _pose(numbers, pose)
     if tensor is not None:
         numbers.require_known([part.tag for part in tensor], tensor, _SIX_URDF, "element")
@@ -401,9 +398,7 @@ class _SdfFrames:
         model = self.around[self.link]
         frames = [part for part in model if part.tag in ("link", "joint", "frame") and part.get("name") == name]
         if not frames and name != "__model__":
-            raise InputError(
-                f"{self.numbers.where}: its model has no frame {quoted(name)}.", "Use frames of one model."
-            )
+            raise InputError(f"{self.numbers.where}: its model has no frame {quoted(name)}.", "Use one model.")
         return frames[0] if frames else model
 
     def in_model(self, element: Element, passed: tuple[Element, ...] = ()) -> Pose:
@@ -488,9 +483,7 @@ def _mjcf(path: Path, root: Element) -> Iterator[Link]:
     """Bodies with an inertial element, read exactly; those that MuJoCo computes or includes, read by MuJoCo."""
     settings = {key: value for compiler in root.iter("compiler") for key, value in compiler.attrib.items()}
     if settings.get("coordinate", "local") != "local":
-        raise InputError(
-            f"{path} uses global coordinates.", "Load and save it in MuJoCo 2.3.3, which makes them local."
-        )
+        raise InputError(f"{path} uses global coordinates.", "Load and save it in MuJoCo 2.3.3: they become local.")
     fused = any(settings.get(key, "auto") not in ("auto", "false") for key in ("inertiafromgeom", "fusestatic"))
     if fused or exact(settings.get("settotalmass", "-1")) > 0 or root.find(".//include") is not None:
         yield from _included(path, set())
@@ -835,9 +828,7 @@ def _toml_table(name: str, table: Mapping[str, Any]) -> BodyInFile:
             'Give about = "pivot" or about = "centre of mass".',
         )
     if table.get("rotor"):
-        raise InputError(
-            f"{numbers.where}: a rotor in a file is not supported.", "Give mass, centre and inertia of the whole body."
-        )
+        raise InputError(f"{numbers.where}: a rotor in a file is not supported.", "Describe the whole body.")
     gravity = (Fraction(0), Fraction(0), -numbers.one(str(table.get("gravity", "9.81")), "gravity"))
     return BodyInFile(name, mass, centre, six, slack, gravity=gravity, at_pivot=table.get("about") == "pivot", si=False)
 

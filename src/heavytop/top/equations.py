@@ -211,10 +211,7 @@ def rotor(top: HeavyTop, start: State) -> Fraction:
     momentum = top.angular_momentum(start.omega)
     area: Fraction = dot(momentum, start.gamma)
     if area == 0:
-        raise InputError(
-            "The gyrostat needs M·gamma != 0: its lambda is P b / (M·gamma).",
-            "Choose a start with a rotation about gamma.",
-        )
+        raise InputError("The gyrostat needs M·gamma != 0, for lambda = P b / (M·gamma).", "Let it rotate about gamma.")
     across = cross(momentum, start.gamma)
     if any(across):
         raise InputError(

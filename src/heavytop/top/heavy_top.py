@@ -174,9 +174,7 @@ class State:
             up = vector(gamma, "gamma")
         else:
             if not isinstance(attitude, Attitude):
-                raise refusal(
-                    "attitude", "an Attitude", quoted(attitude), "Use Attitude.quaternion(w, x, y, z) or another."
-                )
+                raise refusal("attitude", "an Attitude", quoted(attitude), "Use Attitude.quaternion(w, x, y, z).")
             up = attitude.rational_rows(_ATTITUDE_BITS)[2]
             if gamma is not None:
                 _require_same_gamma(vector(gamma, "gamma"), up, attitude)
@@ -410,9 +408,7 @@ def _check_each(values: list[Fraction]) -> None:
         raise InputError("No times were given.", "Give at least one, such as 1, 2, 5.")
     for earlier, later in zip([Fraction(0), *values], values, strict=False):
         if earlier * later < 0:
-            raise InputError(
-                f"The times {shown(earlier)} and {shown(later)} have different signs.", "Run each direction separately."
-            )
+            raise InputError(f"The times {shown(earlier)} and {shown(later)} have different signs.", "Separate them.")
         if abs(later) <= abs(earlier) and (later or earlier):
             raise InputError(
                 f"Times must move strictly away from 0; got {shown(later)} after {shown(earlier)}.",

@@ -329,7 +329,7 @@ def test_rows_of_one_time_are_one_where_they_agree_to_the_digits_printed(tmp_pat
     ("names", "says"),
     [
         ("t,quatA,quatB,quatC,quatD", "looks like an attitude"),
-        ("t,a_w,a_x,a_y,a_z,b_w,b_x,b_y,b_z", "Quaternions are in several columns"),
+        ("t,a_w,a_x,a_y,a_z,b_w,b_x,b_y,b_z", "Several columns are quaternions"),
         ("t,qpos[3],qpos[4],qpos[5],qpos[6]", "is not declared"),
         ("t,rx,ry,rz,n", "# attitude: rotation vector"),
         ("t,cmd_orientation_w,cmd_orientation_x,cmd_orientation_y,cmd_orientation_z", "not found"),

@@ -69,9 +69,7 @@ class ErshkovPartial(WithAngles):
         if self.alpha <= 0:
             raise NotInClass(f"alpha = {shown(self.alpha)} is not positive.", "The partial case needs alpha > 0.")
         if not self.i1 > self.i3 > 0:
-            raise NotInClass(
-                f"I1 = {shown(self.i1)}, I3 = {shown(self.i3)}.", "The partial case (4.1) needs I1 = I2 > I3 > 0."
-            )
+            raise NotInClass(f"I1 = {shown(self.i1)}, I3 = {shown(self.i3)}.", "(4.1) needs I1 = I2 > I3 > 0.")
 
     @classmethod
     def of(cls, top: HeavyTop, start: State) -> ErshkovPartial:

@@ -585,9 +585,7 @@ def _require_done(level: GoryachevLevel) -> None:
         ends = gap_ends(level, curve, separated_start(level))
         # 0 is a root of both factors only, once of each, or more often for h = ±a
         if any(min(curve[number].counts) > 0 for pair in ends for number in pair):
-            raise LevelNotDone(
-                "The level is degenerate: G = 0, and both separated variables, or one, tend to 0.", REMEDY
-            )
+            raise LevelNotDone("The level is degenerate: G = 0, one or both separated variables tend to 0.", REMEDY)
         moving = [(low, high) for low, high in ends if low != high]
         if resting is not None and not any(
             curve[low].value.real > ball(resting) or curve[high].value.real < ball(resting) for low, high in moving

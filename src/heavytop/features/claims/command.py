@@ -41,9 +41,7 @@ def audit(
         if not library:
             raise InputError("No claim was given.", "Give a name of `heavytop claims`, a TOML file, or --library.")
         if claim or system is not None or branch is not None:
-            raise InputError(
-                "--library audits every claim of the library.", "Leave out the claim, --system and --branch."
-            )
+            raise InputError("--library audits every claim.", "Leave out the claim, --system and --branch.")
         return _library(json)
     if branch is not None:
         require_branch(branch)

@@ -124,9 +124,7 @@ def _matrices(jacobians: Any, count: int) -> list[list[list[Any]]]:
             for j, row in enumerate(ordered(matrix, f"jacobians[{i}]", _SHAPE))
         ]
         if len(rows) != 6 or any(len(row) != 6 for row in rows):
-            raise InputError(
-                f"jacobians[{i}] has {len(rows)} rows of {sorted({len(r) for r in rows})} numbers.", _SHAPE
-            )
+            raise InputError(f"jacobians[{i}] has {len(rows)} rows of {sorted({len(r) for r in rows})}.", _SHAPE)
         matrices.append([list(row) for row in rows])
     require_as_many("Jacobians", len(matrices), count)
     if count > MOST_STATES:

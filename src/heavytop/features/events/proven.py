@@ -221,10 +221,7 @@ def _begins(solution: Validated, function: EventFunction) -> tuple[int, int]:
     """(order of the zero at t = 0, sign of the function right behind it in the direction t > 0)."""
     order, value = first_term(function, solution.system, solution.parameters, solution.start.flat)
     if order > _MOST_ORDER:
-        raise OutOfReach(
-            f"The first {order - 1} derivatives of the function vanish at t = 0.",
-            f"At most {_MOST_ORDER} are supported.",
-        )
+        raise OutOfReach(f"The first {order - 1} derivatives vanish at t = 0.", f"At most {_MOST_ORDER} are supported.")
     return order, 1 if value > 0 else -1
 
 

@@ -89,28 +89,19 @@ def _task(case: Case, run: GrowthRun, integrator: str) -> Task:
     """The task of a row; raises InputError for an impossible value."""
     precision = parse(run.precision)
     if precision.bits > _MOST_BITS:
-        raise InputError(
-            f"Ensembles in {precision.name} are not supported.", f"Laws of growth are fitted up to real:{_MOST_BITS}."
-        )
+        raise InputError(f"Ensembles in {precision.name} are not supported.", f"Use formats up to real:{_MOST_BITS}.")
     for name, limits in _LIMITS.items():
         if (value := getattr(run, name)) not in limits:
-            raise InputError(
-                f"{name} of a growth run must be from {limits[0]} to {limits[-1]}; got {value}.", "Change it."
-            )
+            raise InputError(f"{name} must be from {limits[0]} to {limits[-1]}; got {value}.", "Change it.")
     horizon = physical(run.horizon, "horizon")
     if horizon <= 0:
         raise InputError(f"horizon of a growth run must be positive; got {run.horizon}.", "Give a positive number.")
     if run.tolerance is not None:
         usable_tolerance(run.tolerance, precision)
     if run.bias is not None and abs(exact(run.bias)) >= 1:
-        raise InputError(
-            f"bias of a growth run must be between -1 and 1; got {run.bias}.", "Give a relative error, such as 1e-9."
-        )
+        raise InputError(f"bias must be between -1 and 1; got {run.bias}.", "Give a relative error, such as 1e-9.")
     if run.reference is not None and parse(run.reference).bits <= precision.bits:
-        raise InputError(
-            f"reference must have more bits; got {run.reference}.",
-            f"Name a format with more bits than {run.precision}.",
-        )
+        raise InputError(f"reference must have more bits; got {run.reference}.", f"Give more than {run.precision}.")
     steps = range(-run.samples * run.decades, 1)
     times = tuple(horizon * Fraction(f"{10 ** (step / run.samples):.4g}") for step in steps)
     controls = {"tolerance": run.tolerance or "", "high_accuracy": run.high_accuracy, "bias": run.bias or ""}

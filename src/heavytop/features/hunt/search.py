@@ -590,10 +590,7 @@ def kept(path: Path) -> tuple[Motion, ...]:
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path} cannot be read: {invalid(error)}.", _PASTE) from None
     if any(case.system is GYROSTAT for case in cases):
-        raise InputError(
-            f"{path} contains a top of the system gyrostat.",
-            "Remove it: only heavy_top and heavy_gyrostat are supported.",
-        )
+        raise InputError(f"{path} contains a gyrostat.", "Remove it: only heavy_top and heavy_gyrostat are supported.")
     return tuple((case.top, case.start) for case in cases)
 
 

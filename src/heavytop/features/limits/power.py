@@ -134,9 +134,7 @@ def power(
     spacing = end / 100 if step is None else physical(step, "step")
     if not (0 < spacing <= end and limit > 0):
         values = f"until = {until}, step = {spacing}, tolerance = {tolerance}"
-        raise InputError(
-            f"{values}: these must be positive, and step at most until.", "Give, for example, 10, 0.1, 1e-6."
-        )
+        raise InputError(f"{values}: these must be positive, and step at most until.", "Give, say, 10, 0.1, 1e-6.")
     count = int(end // spacing)
     if count > _MOST:
         raise InputError(f"At most {_MOST} samples; got {count}.", "Give a larger step, or an earlier end.")

@@ -87,9 +87,7 @@ class LocalErrorKind(Kind):
         for time, step in steps:
             error(time, step)
         if run.outcome is Outcome.SUCCESS and not error.running.count:
-            raise OutOfReach(
-                f"{case.name} is an equilibrium, on which integrators take no steps.", "Measure the steps of a motion."
-            )
+            raise OutOfReach(f"{case.name} is an equilibrium, which takes no steps.", "Measure a motion.")
         row = computed_row(task, run, error.metrics(), {}, _AGAINST)
         row = msgspec.structs.replace(row, samples=error.running.count)
         if task.integrator.own:

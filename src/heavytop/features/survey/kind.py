@@ -62,9 +62,7 @@ class SurveyTable(PlanTable, tag=NAME):
         if self.tolerance:
             positive([self.tolerance], "tolerance")
         if self.map and (len(set(self.map)) != 2 or len(self.map) != 2 or not set(self.map) <= set(DATA)):
-            raise InputError(
-                f"A map over {quoted(', '.join(self.map))} has no two axes.", f"Use two of {', '.join(DATA)}."
-            )
+            raise InputError(f"A map over {quoted(', '.join(self.map))} needs two axes.", f"Use {', '.join(DATA)}.")
         times, _ = uniform(horizon, self.samples)
         subject, request = computed(self.integrator, tolerance=self.tolerance), {"samples": str(self.samples)}
         more = {"options": tuple(self.map), "request": request}

@@ -207,9 +207,7 @@ class Tower(PolynomialRing):
         if radicand != self.one:
             roots.append(self._simplest_root(radicand * sign))
         elif sign < 0:
-            raise Unprovable(
-                "A square root of a negative number.", "Check the formula, or the domain it is claimed on."
-            )
+            raise Unprovable("A square root of a negative number.", "Check the formula, or its domain.")
         return prod(roots, start=self.polynomial(outside)) * self.root_of_number(abs(constant))
 
     def _simplest_root(self, square: fmpq_mpoly) -> Quotient:

@@ -301,9 +301,7 @@ class _Parser(Descent):
         limits = ExpressionBounds(_MAX_NODES, _MAX_BITS, _MAX_DEGREE, _MAX_TERMS)
         for what, value, limit in zip(ExpressionBounds._fields, size, limits, strict=True):
             if value > limit:
-                raise TooLarge(
-                    f"{self._where}: the formula grows beyond {limit} {what}.", "Define parts of it in [definitions]."
-                )
+                raise TooLarge(f"{self._where}: the formula grows beyond {limit} {what}.", "Use [definitions].")
 
 
 def _added(a: ExpressionBounds, b: ExpressionBounds) -> ExpressionBounds:

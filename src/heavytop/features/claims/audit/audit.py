@@ -91,9 +91,7 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> FileClaim | ValueC
     if content.quadrature is not None and needed == "integral":
         raise InputError(f"{where}: [quadrature] is about a motion, and kind = {content.kind!r}.", _REMEDY)
     if content.domain not in ("all", "t<=0", "t>0"):
-        raise InputError(
-            f'{where}: domain must be "all", "t<=0" or "t>0"; got {content.domain[:40]!r}.', "Give one of these."
-        )
+        raise InputError(f'{where}: domain must be "all", "t<=0" or "t>0"; got {content.domain[:40]!r}.', "Change it.")
     content = msgspec.structs.replace(content, entry=entry)
     with prefixed(where):
         return claim_class(content)

@@ -436,9 +436,7 @@ def _at(expression: sympy.Expr, sample: dict[sympy.Symbol, Fraction]) -> arb:
     try:
         return evaluate(expression, sample, _SAMPLE_BITS)
     except (KeyError, Unprovable):
-        raise InputError(
-            f"{written(str(expression))[:80]} is not a number at a sample.", "Use parameters only."
-        ) from None
+        raise InputError(f"{written(str(expression))[:80]} has no value at a sample.", "Use parameters only.") from None
 
 
 def setting_of(context: Context, variable: sympy.Symbol) -> Setting:

@@ -298,9 +298,7 @@ def _with_times(clock: Clock, content: ClaimFile) -> Clock:
         return clock
     times = tuple(sample_number(time, "times") for time in content.times)
     if any(time * domain.sign < 0 or (domain is AFTER and time == 0) for time in times):
-        raise InputError(
-            f"A time of {', '.join(content.times)} lies outside {domain.label}.", "Change times or domain."
-        )
+        raise InputError(f"A time of {', '.join(content.times)} is outside {domain.label}.", "Change one of them.")
     points = tuple(dict.fromkeys((*times, *domain.points)))
     return replace(clock, domain=replace(domain, points=points))
 

@@ -117,9 +117,7 @@ class Header:
         for quantity, name in (("omega", "omega"), ("framed", "omega"), ("gamma", "gamma")):
             components = self.places.get(quantity, {})
             if {"0", "3"} <= set(components):
-                raise InputError(
-                    f"The header has both {name}0 and {name}3.", "Number them from 1 to 3, or from 0 to 2."
-                )
+                raise InputError(f"The header has both {name}0 and {name}3.", "Number from 1 to 3, or from 0 to 2.")
             for component, index in components.items():
                 axis = _AXES.get(component) or str(int(component) + ("0" in components))
                 if indices.setdefault(f"{name}{axis}", index) != index:
@@ -376,9 +374,7 @@ def convention(document: Mapping[str, Any], header: Header | None = None) -> Con
         if (word := _word(document, key)) is not None:
             stated[key] = word.upper() if key == "sequence" else word.lower().lstrip("+")
     if header is not None and header.angles and stated.setdefault("angles", header.angles) != header.angles:
-        raise InputError(
-            f"The header declares {header.angles}, but angles = {stated['angles']}.", "Give the unit of angles once."
-        )
+        raise InputError(f"The header declares {header.angles}, but angles = {stated['angles']}.", "Give it once.")
     for key in ("pivot", "point"):
         if document.get(key) is not None:
             stated[key] = vector(_numbers(document[key], key, 3), key)

@@ -373,9 +373,7 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
     if logs.is_ephemeris(text):
         text = logs.of_ephemeris(text)
     if re.match(r'\s*\{\s*"schema"\s*:\s*"heavytop-report', text):
-        raise InputError(
-            f"{shown_path} is a report of heavytop, not a trajectory.", f"`heavytop show {shown_path}` shows it."
-        )
+        raise InputError(f"{shown_path} is a report, not a trajectory.", f"`heavytop show {shown_path}` shows it.")
     is_json = text.lstrip().startswith("{") if piped else path.suffix.lower() == ".json"
     try:
         document, notes = (_json(text), []) if is_json else read_table(text, case is not None)

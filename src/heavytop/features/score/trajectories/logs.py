@@ -248,9 +248,7 @@ def with_quaternion(names: Sequence[str]) -> list[str]:
             prefixes.setdefault(match[1].lower(), {})[match[2].lower()] = index
     whole = {prefix: places for prefix, places in prefixes.items() if places.keys() == set("wxyz")}
     if len(whole) > 1:
-        raise InputError(
-            f"Quaternions are in several columns: {', '.join(whole)}.", "Call those of the body qw,qx,qy,qz."
-        )
+        raise InputError(f"Several columns are quaternions: {', '.join(whole)}.", "Call that of the body qw,qx,qy,qz.")
     places = {index: f"q{axis}" for part in whole.values() for axis, index in part.items()}
     return [places.get(index, name) for index, name in enumerate(names)]
 
@@ -295,9 +293,7 @@ def of_ephemeris(text: str) -> str:
     meta = dict(re.findall(r"^\s*([A-Z_]+)\s*=\s*(.*?)\s*$", text, re.MULTILINE))
     kind = meta.get("ATTITUDE_TYPE", "").upper()
     if kind not in _KINDS:
-        raise InputError(
-            f"ATTITUDE_TYPE = {quoted(kind)} is not supported.", f"Write it with one of {', '.join(_KINDS)}."
-        )
+        raise InputError(f"ATTITUDE_TYPE = {quoted(kind)} is not supported.", f"Use one of {', '.join(_KINDS)}.")
     first = meta.get("QUATERNION_TYPE", "LAST").upper() == "FIRST"
     order = ["qw", "qx", "qy", "qz"] if first else ["qx", "qy", "qz", "qw"]
     of_spacecraft = {letter: bool(_SPACECRAFT.match(meta.get(f"REF_FRAME_{letter}", ""))) for letter in "AB"}
