@@ -38,7 +38,7 @@ def part(name: str, budget: int, horizon: int) -> str:
     hunt = ht.hunt(name, budget=budget, horizon=horizon)
     a = hunt.hunted
     lines = [f"\n## {name}", "```text", f"$ {hunt.again}", "```"]
-    counts = f"{a.motions} motions to T = {shown(Fraction(horizon))}; {a.lost} leave no digit in any double. "
+    counts = f"{a.motions} motions to T = {shown(Fraction(horizon))}; {a.lost} lose all digits in any double. "
     lines.append(f"{counts}Its law: {law_text(a)}.")
     if hunt.found:
         lines += ["", "**Found**, beyond what that explains:", "", "```text", str(hunt), "```"]

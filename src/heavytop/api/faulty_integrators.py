@@ -147,21 +147,21 @@ FAULTS = {
     "tolerance": Fault("tolerance 1e-9", options={"tolerance": Fraction(1, 10**9)}),
     "order": Fault("one order less, at heyoka's own step", stepping=_OneOrderLess),
     "summation": Fault(
-        "compensated summation in a step the other way round: on, where the healthy run has it off",
+        "compensated summation within a step: on, but off in the healthy run",
         options={"high_accuracy": True},
         detectable=False,
     ),
     "clock": Fault("time summed in one double", stepping=_ClockInOneWord, detectable=False),
     "axes": Fault(
-        "axes 1 and 2 swapped in what is handed over",
+        "axes 1 and 2 swapped in the states returned",
         states=lambda states: [state[[1, 0, 2, 4, 3, 5]] for state in states],
     ),
     "frozen": Fault(
-        "the state stands still from the middle on",
+        "the state is constant from the middle on",
         states=lambda states: [states[min(index, len(states) // 2)] for index in range(len(states))],
     ),
     "nan": Fault("the last state is NaN", states=lambda states: [*states[:-1], states[-1] * math.nan]),
-    "stop": Fault("stops early and says so", stops=Fraction(3, 4)),
-    "silent stop": Fault("stops early and says nothing", stops=Fraction(3, 4), silent=True),
+    "stop": Fault("stops early and reports it", stops=Fraction(3, 4)),
+    "silent stop": Fault("stops early without a report", stops=Fraction(3, 4), silent=True),
 }
 """Each fault by name."""
