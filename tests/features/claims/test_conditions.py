@@ -30,7 +30,7 @@ FREE = top("2 3 5", "0 0 1", weight="0")
         ("exp(log(-1 - t^2)) + 1 + t^2", "all", "-t^2 - 1 > 0"),
         ("1 + 0*log(t)", "all", "t > 0"),
         ("1 + 0*sqrt(-t)", "t>0", "-t ≥ 0"),
-        ("1 + 0*asin(2 + t^2)", "all", "at no sample in the domain"),
+        ("1 + 0*asin(2 + t^2)", "all", "at every sample in the domain a formula is undefined"),
         ("(t + sqrt(t^2))/(t + sqrt(t^2))", "all", "t + sqrt(t^2) ≠ 0"),
         ("t*(sqrt(3 + 2*sqrt(2)) - 1 - sqrt(2))/(sqrt(3 + 2*sqrt(2)) - 1 - sqrt(2)) - t + 1", "all", "≠ 0"),
     ],
