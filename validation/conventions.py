@@ -408,7 +408,7 @@ PLANTED = {
     "x up, not said": Planted(("up",), replace(FULL, up="x"), lambda m: {"up": "z"}),
     "z down, not said": Planted(("up", "gravity_sign"), replace(FULL, up="-z"), lambda m: {"up": "z"}),
     "g with the wrong sign": Planted(
-        (), keys=lambda m: {"gravity": repr(-m.gravity)}, refused="gravity points down"),
+        (), keys=lambda m: {"gravity": repr(-m.gravity)}, refused="gravity must not be negative"),
     "g in cm/s²": Planted(("gravity_unit",), keys=lambda m: {"gravity": repr(m.gravity * 100)}),
     "g of 1": Planted(("gravity_unit",), keys=lambda m: {"gravity": "1"},
         also=lambda m: replace(m, gravity=9.81)),
