@@ -422,3 +422,8 @@ def test_a_motion_that_starts_again_is_told_from_rows_that_are_late(again_at: in
 )
 def test_the_digits_are_those_of_the_error_that_is_printed_beside_them(left: float, said: str) -> None:
     assert sentence(Diagnosis("gamma_down", error=2.0, left=left)).endswith(said)
+
+
+def test_moments_that_fit_a_body_say_their_point() -> None:
+    assert "I11 = 1.6, moments about the fixed point" in diagnosis_text(Diagnosis("top", {"I11": "1.6"}, 1.0, 1e-9))
+    assert "I1 = 1.6;" in diagnosis_text(Diagnosis("top", {"I1": "1.6"}, 1.0, 1e-9))
