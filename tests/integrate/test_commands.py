@@ -77,13 +77,13 @@ FAILURES = {
     "talks on": "wrote more after 'done steps",
 }
 DIAGNOSED = {
-    "six digits": ("digits", "Its numbers have 6 significant digits: double takes 17."),
+    "six digits": ("digits", "States have 6 significant digits; double has 17."),
     "single precision": ("digits", "States have 24 bits; double has 53."),
     "wrong backwards": ("backwards", "steps backward in time are wrong"),
-    "swapped": ("one time", "look at the order of the components"),
-    "other each time": ("determinism", "The same request twice gives two answers"),
-    "knows too little": ("unknown lines", "It does not ignore a line that it does not know"),
-    "ignores quit": ("quit", "It does not end within 0.2 s of quit"),
+    "swapped": ("one time", "check the order of the components"),
+    "other each time": ("determinism", "Equal requests give different states"),
+    "knows too little": ("unknown lines", "An unknown line is not ignored"),
+    "ignores quit": ("quit", "The program does not exit within 0.2 s of quit"),
     "outlives its input": ("end of input", "The program does not exit within 0.2 s of end of input"),
 }
 SILENT = {name for name, text in FAILURES.items() if "within 1 s" in text}

@@ -174,7 +174,7 @@ def test_what_is_computed_is_scored_with_the_rotor_of_the_file(tmp_path) -> None
     data = {"inertia": ["3", "2", "1"], "weight": "1", "centre": ["1/2", "1/3", "1/5"]}
     data |= {"omega": ["1/10", "2/5", "9/10"], "gamma": ["3/5", "0", "4/5"], "times": [str(t) for t in times]}
     data |= {"states": run.texts(), "precision": "double"}
-    for rotor, said in ((["1/2", "-1/3", "3/4"], "15"), (["-1/2", "1/3", "-3/4"], "rotor of −k")):
+    for rotor, said in ((["1/2", "-1/3", "3/4"], "15"), (["-1/2", "1/3", "-3/4"], "rotor −k")):
         file.write_text(json.dumps(data | {"rotor": rotor}))
         answer = CliRunner().invoke(app, ["score", str(file)], catch_exceptions=False)
         assert said in answer.output

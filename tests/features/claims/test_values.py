@@ -380,7 +380,7 @@ def test_the_command_line_shows_printed_and_proven(tmp_path: Path) -> None:
     assert row["digits_right"] == row["digits_printed"] == PrintedNumber.read(near, "x").digits
     assert row["domain"] == "t=2"
     text = shown(audit_text(found), 120)
-    parts = "omega 1|energy |0.9|0 of 1|5 of 5|half a unit|refuted|+/-|Known from validated"
+    parts = "omega 1|energy |0.9|0 of 1|5 of 5|half a unit|refuted|+/-|Reference: validated"
     assert [part for part in parts.split("|") if part not in text] == []
 
 

@@ -101,7 +101,7 @@ def test_without_a_reference_and_without_a_sample_no_digits_are_said(unknown: As
     assert (unknown.digits_right, digits_kept(unknown.row), unknown.peer, unknown.direction) == (None,) * 4
     assert "no reference" in unknown.row.against
     assert "drift_energy_max" in unknown.row.metrics
-    assert printed(unknown)[0].startswith("How many digits are right is not known")
+    assert printed(unknown)[0].startswith("The number of digits right is unknown")
     lost = assess(given(spoilt=lambda i, state: [float("nan")] * 6))
     assert printed(lost)[:2] == [
         "The run ended early (non_finite), at t = 0 of 8.",

@@ -230,7 +230,7 @@ def test_what_no_body_has_and_states_in_another_order_are_warnings(tmp_path: Pat
     assert json.loads(said.stdout)["measure"] == "score"
     huge = given | {"states": [[*state[:3], "1e200", *state[4:]] for state in given["states"]]}
     (warning,) = read(written(tmp_path, huge)).warnings()
-    assert "off 1 by 1.00E+400 at t" in warning
+    assert "differs from 1 by 1.00E+400 at t" in warning
 
 
 @pytest.mark.slow
