@@ -124,7 +124,7 @@ def test_the_command_takes_a_case_and_writes_json_and_a_page(tmp_path: Path) -> 
     assert said["peer"]["digits_right"] > 14
     (diagnosis,) = said["diagnosis"]
     assert diagnosis["kind"] == "gamma_down"
-    assert diagnosis["sentence"].startswith("γ points down in these states")
+    assert diagnosis["sentence"].startswith("In these states γ points down")
     text = page.read_text("utf-8")
     assert re.search(r"<h2 id=\"verdict-heading\">0\.0 of 16 digits right at every sample up to T = 8", text)
     assert diagnosis["sentence"].split(";")[0] in text

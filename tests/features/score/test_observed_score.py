@@ -119,7 +119,7 @@ def test_the_sentence_says_what_fits_and_the_digits_that_are_right_with_it(tmp_p
     said = to_json(found)["diagnosis"][0]["sentence"]
     assert said.startswith("The scalar part of the quaternions is at the other end")
     assert "in the columns only" in said
-    assert "so that 13.0 digits or more are right" in said or told.left > 1e-13
+    assert "and 13.0 digits or more are right" in said or told.left > 1e-13
 
 
 @pytest.mark.slow
