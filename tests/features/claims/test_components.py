@@ -140,16 +140,18 @@ def test_a_function_of_time_is_smooth_and_defined_from_its_start(value: str, dom
 
 
 @pytest.mark.parametrize(
-    ("integrand", "verdict"),
+    ("quantity", "integrand", "verdict"),
     [
-        ("1/sqrt(1 - u^2)", "holds"),
-        ("1/(sqrt(1 - u)*sqrt(1 + u))", "holds"),
-        ("sqrt(-1 - u^2)/(sqrt(1 + u^2)*sqrt(u^2 - 1))", "undecided"),
-        ("1/sqrt(1 - u^2) + 0*log(u - 5)", "undecided"),
+        ("Omega1", "1/sqrt(1 - u^2)", "holds"),
+        ("Omega1", "1/(sqrt(1 - u)*sqrt(1 + u))", "holds"),
+        ("Omega1", "sqrt(-1 - u^2)/(sqrt(1 + u^2)*sqrt(u^2 - 1))", "undecided"),
+        ("Omega1", "1/sqrt(1 - u^2) + 0*log(u - 5)", "undecided"),
+        ("exp(Omega1)", "1/(u*sqrt(1 - log(u)^2))", "holds"),
+        ("exp(Omega1)", "1/(u*sqrt(1 - log(u)^2)) + 0*log(u - 5)", "undecided"),
     ],
 )
-def test_an_integrand_is_real_where_the_component_moves(integrand: str, verdict: str) -> None:
-    component = {"quantity": "Omega1", "constants": ["Omega3"]}
+def test_an_integrand_is_real_where_the_component_moves(quantity: str, integrand: str, verdict: str) -> None:
+    component = {"quantity": quantity, "constants": ["Omega3"]}
     table = CIRCLE | {"component": component, "quadrature": {"variable": "u", "integrand": integrand}}
     assert audited(table).verdict == verdict
 

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
+from math import factorial
 
 import sympy
 from msgspec import structs
@@ -45,6 +46,7 @@ _POLE = "gamma is not vertical in the body: elsewhere phi and psi are undefined"
 _IN_TIME = rate_along({TIME: sympy.Integer(1)})
 _AT_A_STATE = replace(ALL, points=(Fraction(0),))
 _ANGLES = ("phi", "theta", "psi")
+_SHORTLY = Fraction(1, 2**16)
 _FROM_START = DOMAINS | {"t>0": replace(AFTER, label="t>=0")}
 """The domains of a function of time with its start, which belongs to it."""
 
@@ -213,7 +215,7 @@ class UserComponent(UserIntegral):
         on_state: list[Statement] = []
         # an integrand may be real between two values of u alone: it must be where u moves
         of_time: frozenset[Need] = frozenset() if self._quadrature is None else self._quadrature.needs
-        moved = replace(ALL, points=self._shortly_after(system) or ALL.points) if of_time else ALL
+        moved = replace(ALL, points=self._shortly_after(system)) if of_time else ALL
         claims: list[tuple[str, int, sympy.Expr, sympy.Expr, sympy.Expr, str, frozenset[Need]]] = []
         one, slope = sympy.Integer(1), rate(q.expression)
         if self._square is not None:
@@ -245,19 +247,25 @@ class UserComponent(UserIntegral):
             elif index == 1 or equation == "rate":
                 residual = sympy.numer(sympy.together(claimed.xreplace({u: q.expression}) * below - above))
                 flow = Flow(rate, frozenset(STATE), kept, False, (OFF_SPHERE,))
-                formulas = Formulas(STATE, base | needs, pole=pole)
+                needs |= base
+                after = sum(part * _SHORTLY**k / factorial(k) for k, part in enumerate(self._rates(system)))
+                sampled = needs | _put(of_time, {u: after}) if equation == "reduced" else needs
+                formulas = Formulas(STATE, needs, pole=pole, sampled=sampled)
                 on_state.append(Statement(equation, index, "smooth", _AT_A_STATE, residual, text, formulas, flow))
         return in_u, on_state
 
+    def _rates(self, system: System) -> tuple[sympy.Expr, sympy.Expr, sympy.Expr]:
+        """u, u' and u'' on the state."""
+        first = self._rate(system)(self.quantity.expression)
+        return self.quantity.expression, first, self._rate(system)(first)
+
     def _shortly_after(self, system: System) -> tuple[Fraction, ...]:
         """Values of u on the way of the motion from each sample, to the second order in a short time."""
-        first = self._rate(system)(self.quantity.expression)
-        parts = (self.quantity.expression, first, self._rate(system)(first))
         points: dict[Fraction, None] = {}
         for sample in self.at_states.samples:
-            if values := rational_values(parts, sample):
+            if values := rational_values(self._rates(system), sample):
                 u, speed, acceleration = values
-                times = (Fraction(1, 2**8), Fraction(1, 2**16))
+                times = (Fraction(1, 2**8), _SHORTLY)
                 points |= dict.fromkeys(u + speed * time + acceleration * time**2 / 2 for time in times)
         return tuple(points)
 
