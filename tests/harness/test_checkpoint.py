@@ -378,7 +378,7 @@ def test_sigterm_ends_a_run_with_exit_143_and_it_goes_on(quick: Path) -> None:
     assert (out / "rows.jsonl").exists()
     resumed(quick, out)
     assert rows_of(out) == rows_of(quick / "whole")
-    assert "was finished already" in resumed(quick, out)
+    assert "(already finished)" in resumed(quick, out)
 
 
 def test_each_row_of_a_finished_run_is_read_from_the_disk_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -84,7 +84,7 @@ DIAGNOSED = {
     "other each time": ("determinism", "Equal requests give different states"),
     "knows too little": ("unknown lines", "An unknown line is not ignored"),
     "ignores quit": ("quit", "The program does not exit within 0.2 s of quit"),
-    "outlives its input": ("end of input", "The program does not exit within 0.2 s of end of input"),
+    "outlives its input": ("end of input", "The program does not exit within 0.2 s of the end of input"),
 }
 SILENT = {name for name, text in FAILURES.items() if "within 1 s" in text}
 

@@ -70,7 +70,7 @@ def test_a_fault_of_heavy_gyrostats_is_found_shrunk_and_kept(monkeypatch: pytest
 def test_a_healthy_integrator_has_none_and_says_what_explains_its_worst() -> None:
     hunt = ht.hunt(budget=96, horizon=4, seed=3)
     assert (hunt.found, hunt.motions, hunt.seed) == ([], 96, 3)
-    assert "Nothing was found" in str(hunt)
+    assert "Nothing found" in str(hunt)
     assert "--budget 96 --seed 3" in str(hunt)
 
 
