@@ -132,7 +132,7 @@ def test_axes_go_in_and_come_out_and_nothing_else_is_touched(run, known) -> None
         assert draw(run, axes=solid) is solid
         with pytest.raises(InputError, match="three-dimensional"):
             draw(run, axes=plane)
-    with pytest.raises(InputError, match="no plane axes"):
+    with pytest.raises(InputError, match="two-dimensional axes"):
         ht.plot.phase(run, axes=solid)
     rendered(plane)
     assert dict(matplotlib.rcParams) == before
