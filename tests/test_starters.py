@@ -160,7 +160,7 @@ def gate_moves(folder: Path) -> None:
     (folder / "mine.py").write_text(text)
     (folder / ".heavytop" / "new" / "notes").touch()
     code, said = gate()
-    assert (code, "not an empty folder" in said) == (2, True)
+    assert (code, "already contains" in said) == (2, True)
 
 
 @pytest.mark.slow
