@@ -114,7 +114,7 @@ def test_the_verdict_comes_first_then_the_sections_in_their_order(pages: dict[st
 @pytest.mark.parametrize(
     ("verdict", "words"),
     [
-        ("refuted", "motion of the heavy top (γ ∥ M); it is a motion of the gyrostat."),
+        ("refuted", "motion of the heavy top (γ ∥ M); it holds for the gyrostat."),
         ("holds", "every equation is proven."),
         ("undecided", "not refuted, but not every equation is proven."),
     ],
@@ -438,7 +438,7 @@ def test_kinds_that_are_mixed_answer_in_order(default: Report) -> None:
     )
     assert opened[0] == "heyoka in double: 8.7 of 16 digits right to T = 1e5 (lagrange), none on generic."
     said = [other[1].strip() for other in others]
-    assert said[0].endswith("it is a motion of the gyrostat.")
+    assert said[0].endswith("it holds for the gyrostat.")
     kinds = ("claim_model", "homoclinic", "break_away_law", "claim_evaluation")
     assert said[1:] == [ALONE[kind] for kind in kinds]
 

@@ -280,7 +280,7 @@ class Field:
         if e.is_Pow:
             return self._power(e)
         if not e.args:
-            raise Unprovable(f"{e} is no number.")
+            raise Unprovable(f"{e} is not a number.")
         return self._function(type(e).__name__, [self.enter(part) for part in e.args])
 
     def _definition(self, e: Defined) -> Quotient:

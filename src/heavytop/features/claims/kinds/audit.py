@@ -134,9 +134,7 @@ def _of_paper(rows: Sequence[Row]) -> Headline:
     solved = " and ".join(_SYSTEMS.get(name, name) for name in dict.fromkeys(others))
     if "refuted" in verdicts:
         some = "" if verdicts == {"refuted"} else ", in some cases"
-        return Headline(
-            _CLAIM + some + (f"; it is a motion of {solved}." if others else "."), Word("refuted"), _EVERYWHERE
-        )
+        return Headline(_CLAIM + some + (f"; it holds for {solved}." if others else "."), Word("refuted"), _EVERYWHERE)
     if verdicts == {"holds"}:
         return Headline(_CLAIM + ": every equation is proven.", Word("holds"), _EVERYWHERE)
     return Headline(_CLAIM + ": not refuted, but not every equation is proven.", Word("undecided"), _EVERYWHERE)
