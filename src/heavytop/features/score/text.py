@@ -484,8 +484,8 @@ def one_motion(row: Row, beside: Beside) -> Iterator[Block]:
         yield Card("Remarks", remarks, note=compared, shown=In.FULL | In.PAGE)
     yield Chart(digits_over_time)
     units = (
-        "Errors of Ω are in 1/time unit, of γ in units of |γ|; along and across the flow, of all six components, "
-        "and depend on the unit of time. The drift of each first integral is in its own units."
+        "Errors of Ω are in 1/time unit, of γ in units of |γ|. Those along and across the flow are of all six "
+        "components, and depend on the unit of time. The drift of each first integral is in its own units."
     )
     yield Table("Errors and drift", _SIZES, sizes(row), [units], shown=In.FULL | In.PAGE)
 
