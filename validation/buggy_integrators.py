@@ -158,7 +158,7 @@ _TENTH = 1.1
 _ROUNDING = -12.0
 """log10 of errors up to which rounding may have made them, over the steps of the plan."""
 SIZES = (1e-9, 1e-7, 1e-5, 1e-3)
-MOVED = ("Order observed", "Digits right", "of lower order than the method's")
+MOVED = ("Order observed", "Digits right", "of lower order than the method")
 """What names a wrong coefficient or a lower precision."""
 
 

@@ -147,9 +147,10 @@ def needs_left(draw: random.Random) -> Trap:
         ]
     ).format(k, u)
     spin_is_constant = "Omega3" in u and inertia[0] == inertia[1] and centre[:2] == ("0", "0")
+    is_defined = u == "gamma2" and "asin" in value  # |γ2| is at most 1
     # a free body's energy is positive and so is γi + 3: the roots are real, and where the divisor is 0 there is a limit
     limit = "gamma" in u and "Omega" not in u and value.endswith("+ 3)") and centre == ("0", "0", "0") and area not in k
-    if spin_is_constant or limit:
+    if spin_is_constant or is_defined or limit:
         return _integral(value, (), inertia, centre), _OPEN, "needs", "heavy_top"
     return _integral(value, (), inertia, centre, states=_SOME), _FALSE, "needs", "heavy_top"
 
