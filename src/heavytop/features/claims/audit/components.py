@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
-from math import factorial
+from typing import TypeVar
 
 import sympy
 from msgspec import structs
@@ -47,6 +47,7 @@ _IN_TIME = rate_along({TIME: sympy.Integer(1)})
 _AT_A_STATE = replace(ALL, points=(Fraction(0),))
 _ANGLES = ("phi", "theta", "psi")
 _SHORTLY = Fraction(1, 2**16)
+_Value = TypeVar("_Value", sympy.Expr, Fraction)
 _FROM_START = DOMAINS | {"t>0": replace(AFTER, label="t>=0")}
 """The domains of a function of time with its start, which belongs to it."""
 
@@ -193,9 +194,8 @@ class UserComponent(UserIntegral):
 
     def _moves(self, system: System, sample: Mapping[sympy.Symbol, Fraction]) -> bool:
         """Whether u is not constant along the motion from the start."""
-        rate = self._rate(system)
-        first = rate(self.quantity.expression)
-        zeros = [is_exactly_zero(self._at_start(e), sample) for e in (first, rate(first))] if self.start else [False]
+        rates = self._rates(system)[1:]
+        zeros = [is_exactly_zero(self._at_start(e), sample) for e in rates] if self.start else [False]
         return any(zero is False for zero in zeros)
 
     def _is_on_conditions(self, sample: Mapping[sympy.Symbol, Fraction]) -> bool:
@@ -248,7 +248,7 @@ class UserComponent(UserIntegral):
                 residual = sympy.numer(sympy.together(claimed.xreplace({u: q.expression}) * below - above))
                 flow = Flow(rate, frozenset(STATE), kept, False, (OFF_SPHERE,))
                 needs |= base
-                after = sum(part * _SHORTLY**k / factorial(k) for k, part in enumerate(self._rates(system)))
+                after = _after(self._rates(system), _SHORTLY)
                 sampled = needs | _put(of_time, {u: after}) if equation == "reduced" else needs
                 formulas = Formulas(STATE, needs, pole=pole, sampled=sampled)
                 on_state.append(Statement(equation, index, "smooth", _AT_A_STATE, residual, text, formulas, flow))
@@ -264,9 +264,7 @@ class UserComponent(UserIntegral):
         points: dict[Fraction, None] = {}
         for sample in self.at_states.samples:
             if values := rational_values(self._rates(system), sample):
-                u, speed, acceleration = values
-                times = (Fraction(1, 2**8), _SHORTLY)
-                points |= dict.fromkeys(u + speed * time + acceleration * time**2 / 2 for time in times)
+                points |= dict.fromkeys(_after(values, time) for time in (Fraction(1, 2**8), _SHORTLY))
         return tuple(points)
 
     def _known_components(self) -> dict[sympy.Expr, sympy.Expr]:
@@ -331,6 +329,12 @@ class UserComponent(UserIntegral):
                     made("angle", index, residual, f"{name}' of {name}", Formulas((c, angle.expression), needs))
                 )
         return equations
+
+
+def _after(rates: Sequence[_Value], time: Fraction) -> _Value:
+    """u after a short time, to the second order, by u, u' and u''."""
+    u, speed, acceleration = rates
+    return u + speed * time + acceleration * time**2 / 2
 
 
 def _is_at(state: Mapping[sympy.Symbol, Fraction], zeros: Iterable[sympy.Expr]) -> bool:
