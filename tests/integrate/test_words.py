@@ -64,6 +64,25 @@ def worst(run: Trajectory) -> Fraction:
     return found
 
 
+@pytest.mark.parametrize("precision", FORMATS, ids=lambda precision: precision.name)
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("attitude", [False, True])
+def test_a_pendulum_about_the_unstable_axis_stays_in_its_plane(axis: int, attitude: bool, precision: Precision) -> None:
+    """Rounding errors out of the plane would grow by 1e16 until t = 20."""
+    inertia, centre, omega, gamma = (
+        vector[-axis:] + vector[:-axis]
+        for vector in ([2, 1, 3], [0, Fraction(1, 3), Fraction(1, 5)], [-8, 0, 0], [0, Fraction(3, 5), Fraction(4, 5)])
+    )
+    top, start = HeavyTop(inertia, 1, centre), State(omega, gamma)
+    xi = perpendicular(start.gamma) if attitude else None
+    run = propagate_multiword(top, start, [Fraction(20)], precision, xi=xi)
+    moving = [axis, 3 + (axis + 1) % 3, 3 + (axis + 2) % 3]
+    known = find(run.problem.top, run.problem.start).state(Fraction(20), precision.bits + 24)
+    errors = [abs(value - midpoint(ball)) for value, ball in zip(bits(run)[0][:6], known, strict=True)]
+    assert max(errors[k] for k in moving) <= 2000 * precision.eps
+    assert max(errors[k] for k in range(6) if k not in moving) <= precision.eps * Fraction(1, 2**20)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("integrate", "precision"), EVERY_FORMAT)
 @pytest.mark.parametrize("given", VECTORS, ids=lambda given: given["name"])

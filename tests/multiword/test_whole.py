@@ -9,8 +9,8 @@ from heavytop import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, HeavyTop, Outcome, Sta
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import midpoint
 from heavytop.integrate.multiword.motions import propagate_multiword
-from heavytop.multiword.codegen.recurrence import rates
-from heavytop.multiword.integers.integer_series import IntegerMotion, field_of
+from heavytop.multiword.codegen.recurrence import rates, series_rates
+from heavytop.multiword.integers.integer_series import IntegerMotion, field_of, in_invariant_plane
 from heavytop.multiword.problem import Scaled, Status
 from heavytop.precision import exact
 from support.helpers import random_parameters, vector
@@ -39,6 +39,31 @@ def test_the_field_is_that_of_the_lanes(system, attitude: bool, forwards: bool) 
             for row in field.rows
         ]
         assert found == [(1 if forwards else -1) * rate for rate in rates(system, scaled.coefficients, state)]
+
+
+@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda system: system.name)
+@pytest.mark.parametrize("attitude", [False, True])
+def test_components_that_stay_0_are_those_whose_taylor_coefficients_are_0(system, attitude: bool) -> None:
+    random, planes = Random(7), 0
+    for _ in range(60):
+        drawn = random_parameters(random, system)
+        share = random.choice((0, 1))
+        moment = tuple(value * random.choice((0, 1)) for value in drawn.moment)
+        rotor = tuple(share * value for value in drawn.rotor) if isinstance(drawn.rotor, tuple) else drawn.rotor
+        y = tuple(value * random.choice((0, 0, 1)) for _ in range(2 + attitude) for value in vector(random))
+        problem = Scaled.of(system, drawn._replace(moment=moment, rotor=rotor), y)
+        plane = in_invariant_plane(problem)
+        series = [problem.state]
+        while len(series) < 8:
+            series.append(tuple(rate / len(series) for rate in series_rates(system, problem.coefficients, series)))
+        constant = [not any(column) for column in zip(*series, strict=True)]
+        state = [0 if zero else value for zero, value in zip(constant, vector(random) * 3, strict=False)]
+        assert rates(system, plane.coefficients, state) == rates(system, problem.coefficients, state)
+        probe = rates(system, plane.coefficients, [*map(Fraction, (2, 3, 5, 7, 11, 13, 17, 19, 23)[: len(y)])])
+        assert all(rate == 0 for rate, zero in zip(probe, constant, strict=True) if zero)
+        planes += 0 < sum(constant) < len(y)
+        assert (plane is problem) == (not any(constant))
+    assert planes > 5
 
 
 @pytest.mark.slow

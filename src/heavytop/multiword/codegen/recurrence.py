@@ -5,6 +5,7 @@ doubles above it.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
@@ -126,6 +127,15 @@ class Coefficients:
             self.torque * torque,
             self.turning * turning,
         )
+
+    def without(self, components: AbstractSet[int]) -> Coefficients:
+        """The coefficients with rates 0 of these components of (Ω, γ, ξ)."""
+        kept = [[3 * vector + lane not in components for lane in range(8)] for vector in range(len(self.vectors))]
+        vectors = (
+            tuple(tuple(c if keep else Fraction(0) for c, keep in zip(row, lanes, strict=True)) for row in rows)
+            for rows, lanes in zip(self.vectors, kept, strict=True)
+        )
+        return replace(self, vectors=tuple(vectors))
 
 
 @lru_cache(maxsize=256)

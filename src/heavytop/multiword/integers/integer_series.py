@@ -9,7 +9,7 @@ don't be too lazy", 2002).  All sums are exact, so the coefficients do not depen
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import lcm
 from operator import mul
@@ -164,16 +164,35 @@ def field_of(problem: Scaled, forwards: bool) -> _Field:
     pairs = (*_PAIRS, *turning)
     rows = []
     for component in range(len(problem.state)):
-        vector, axis = divmod(component, 3)
-        j, k = _PAIRS[axis]
-        products: dict[int, Fraction] = {}
-        if vector == 0:
-            products[axis] = problem.coefficients.vectors[0][0][axis]
-        else:
-            products[pairs.index((3 * vector + j, k))] = Fraction(1)
-            products[pairs.index((3 * vector + k, j))] = Fraction(-1)
+        products = {pairs.index(pair): c for pair, c in _products(problem, component).items()}
         rows.append(_row(products, _linear(problem, component), sign))
     return _Field(pairs, tuple(rows))
+
+
+def in_invariant_plane(problem: Scaled) -> Scaled:
+    """The problem with rates that are exactly 0 in each component that is 0 at all times.
+
+    Each term of such a rate has a factor that is 0 at all times.  The lanes compute γ × Ω from sums, whose rounding
+    errors would grow about an unstable axis, as in a pendulum about the middle one.
+    """
+    zeros = {k for k, value in enumerate(problem.state) if not value}
+    while moving := {k for k in zeros if not _vanishes(problem, k, zeros)}:
+        zeros -= moving
+    return replace(problem, coefficients=problem.coefficients.without(zeros)) if zeros else problem
+
+
+def _vanishes(problem: Scaled, component: int, zeros: set[int]) -> bool:
+    products = all(zeros.intersection(pair) for pair, c in _products(problem, component).items() if c)
+    return products and zeros.issuperset(_linear(problem, component))
+
+
+def _products(problem: Scaled, component: int) -> dict[tuple[int, int], Fraction]:
+    """Pair of components -> coefficient, of the quadratic part of one component's rate."""
+    vector, axis = divmod(component, 3)
+    j, k = _PAIRS[axis]
+    if vector == 0:
+        return {(j, k): problem.coefficients.vectors[0][0][axis]}
+    return {(3 * vector + j, k): Fraction(1), (3 * vector + k, j): Fraction(-1)}
 
 
 def _linear(problem: Scaled, component: int) -> dict[int, Fraction]:
