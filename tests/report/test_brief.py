@@ -125,6 +125,7 @@ def test_brief_and_whole_reports_compare_alike_however_they_are_laid_out(tmp_pat
         (b"heavytop-report/2", b"other-report/7", "schema"),
         (b'"log10":-12.0', b'"log10":null', "disagree"),
         (b'"1E-12"', b'"much"', "not a finite number"),
+        (b'"1E-12","log10":-12.0,"kind":"error","bound":null', b'"1","log10":0.0,"bound":"1E-12"', "1 with a bound"),
         (b'"time_reached":"100"', b'"time_reached":"99"', "a success that reached only 99"),
         (b'"value":"1E-12","log10":-12.0', b'"value":"nan","log10":null', "said to be finite"),
     ],

@@ -373,6 +373,8 @@ WORDS = {
 def _of_metric(metric: Metric, finite: bool) -> Iterator[str]:
     if metric.bound is not None and (cause := _cause(metric.bound) or _negative(metric.bound)):
         yield f"its bound: {cause}"
+    if metric.bound is not None and metric.value != UNRESOLVED:
+        yield f"{metric.value} with a bound"
     if metric.value in WORDS[metric.kind]:
         if metric.log10 is not None:
             yield f"{metric.value} with a logarithm"
