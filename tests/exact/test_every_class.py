@@ -37,6 +37,7 @@ FAMILIES = {
     "lagrange": Family("elliptic_motions", 20, "random_lagrange"),
     "lagrange's gyrostat": Family("elliptic_motions", 9, "random_lagrange_gyrostat"),
     "pendulum": Family("pendulum", 20),
+    "pendulum with a rotor": Family("pendulum", 9, "random_gyrostat"),
     "spherical": Family("spherical_and_tilted", 16, "random_spherical"),
     "pendulum about a tilted axis": Family("spherical_and_tilted", 12, "random_tilted"),
     "pendulum of a spherical body": Family("spherical_and_tilted", 12, "random_spherical_pendulum"),

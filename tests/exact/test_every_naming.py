@@ -41,6 +41,8 @@ HEAVY_GYROSTATS = {
     "LagrangeGyrostat": HeavyTop((3, 3, 1), 1, (0, 0, "2/3"), (0, 0, "-1/2")),
 }
 MOTIONS += [(name, top, GENERIC[1], HEAVY_GYROSTAT) for name, top in HEAVY_GYROSTATS.items()]
+WHEEL = HeavyTop((3, 2, 1), 1, ("1/2", 0, "1/3"), (0, "2/7", 0))
+MOTIONS += [("PendulumGyrostat", WHEEL, State((0, "5/4", 0), ("3/5", 0, "4/5")), HEAVY_GYROSTAT)]
 SETTINGS = {"spoiling": (2, 1), "as a program starts": (53, 10)}
 AS_IT_STARTS, SPOILING = ((0, 1, 2),), ((2, 1, 0),)
 """Namings for the settings of a program that starts: that of the class; for spoiling ones an odd one."""

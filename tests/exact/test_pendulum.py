@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import pytest
 
-from heavytop.exact.cases.pendulum import Pendulum
+from heavytop.exact.cases.pendulum import Pendulum, PendulumGyrostat
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_every_digit, assert_solves, positive, rational, triple
 
@@ -24,6 +24,12 @@ def random_motion(seed):
     rng = random.Random(seed)
     gamma, centre = (rational(rng), 1 + positive(rng)), (positive(rng), rational(rng))
     return pendulum(seed % 3, rational(rng, size=8), gamma, centre, triple(rng, positive))
+
+
+def random_gyrostat(seed):
+    plain, rng = random_motion(seed), random.Random(seed)
+    rotor = [rational(rng, size=5) * (axis == seed % 3) for axis in range(3)]
+    return PendulumGyrostat(HeavyTop(plain.top.inertia, plain.top.weight, plain.top.centre, rotor), plain.start)
 
 
 # the separatrix is ½ I Ω² + n·γ = |n||γ|: n = (0, 2), γ = (3/5, −4/5) and I = 4/5 ask Ω² = 9

@@ -27,7 +27,7 @@ from heavytop.exact.cases.hess import Hess, HessPendulum
 from heavytop.exact.cases.kovalevskaya import Kovalevskaya
 from heavytop.exact.cases.lagrange import Lagrange, LagrangeGyrostat, SphericalTop
 from heavytop.exact.cases.one_interval import Steklov
-from heavytop.exact.cases.pendulum import Pendulum
+from heavytop.exact.cases.pendulum import Pendulum, PendulumGyrostat
 from heavytop.exact.cases.staude import Staude
 from heavytop.exact.cases.zhukovsky_volterra import ZhukovskyVolterra
 from heavytop.exact.closed_form import (
@@ -101,6 +101,7 @@ _CLASSES: dict[str, tuple[Class, ...]] = {
     ),
     HEAVY_GYROSTAT.name: (
         _steady(HEAVY_GYROSTAT),
+        Class.of(PendulumGyrostat, _KEEP),
         Class.of(LagrangeGyrostat, CYCLIC),
         Class.of(ZhukovskyVolterra, _KEEP),
         Class.of(Sretensky, CYCLIC),

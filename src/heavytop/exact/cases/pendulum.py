@@ -30,6 +30,7 @@ from heavytop.exact.elliptic.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.flint.balls import BallLike, Balls, ball, nearest_integer
 from heavytop.exact.solution import GAMMA, TORQUE, ExactRelation
 from heavytop.precision import Vector, cross, dot
+from heavytop.top.equations import HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
 
 
@@ -43,7 +44,13 @@ def _axis(top: HeavyTop, start: State) -> Vector:
 
 def _off_principal(top: HeavyTop, start: State) -> Vector:
     axis = _axis(top, start)
-    return cross(top.angular_momentum(axis), axis)
+    return cross(_inertia_times(top, axis), axis)
+
+
+def _inertia_times(top: HeavyTop, vector: Vector) -> Vector:
+    """I v, without the rotor."""
+    first, second, third = (i * v for i, v in zip(top.inertia, vector, strict=True))
+    return first, second, third
 
 
 def _off_plane(top: HeavyTop, start: State) -> tuple[Fraction, Fraction]:
@@ -76,6 +83,20 @@ class Pendulum(WithAttitude):
     def motion(self, time: BallLike) -> tuple[list[BallLike], Carry]:
         lattice = _lattice(self)
         return ([arb(0)] * 3, list) if lattice is None else lattice.motion(time)
+
+
+@dataclass(frozen=True, slots=True)
+class PendulumGyrostat(Pendulum):
+    """A pendulum with a rotor along its axis, which exerts no torque: k × Ω = 0.
+
+    Raises NotInClass as :class:`Pendulum`, and unless k lies along the axis.
+    """
+
+    system = HEAVY_GYROSTAT
+    starts = (
+        *Pendulum.starts,
+        ExactRelation("k along this axis", "k x e", lambda top, start: cross(top.rotor or (0, 0, 0), _axis(top, start))),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +181,7 @@ def _lattice(case: Pendulum) -> _Lattice | None:
     if not any(axis):
         return None
     length = dot(axis, axis)
-    inertia = dot(axis, case.top.angular_momentum(axis)) / length
+    inertia = dot(axis, _inertia_times(case.top, axis)) / length
     rate = dot(case.start.omega, axis)
     kinetic = inertia * rate**2 / length / 2
     torque = dot(cross(gamma, n), axis)
