@@ -21,14 +21,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 from flint import arb
 
 from heavytop.exact.closed_form import Carry, WithAttitude, about, cached_per_precision, sign
 from heavytop.exact.elliptic.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.flint.balls import BallLike, Balls, ball, nearest_integer
-from heavytop.exact.solution import GAMMA, TORQUE, ExactRelation
+from heavytop.exact.solution import GAMMA, TORQUE, Conditions, ExactRelation
 from heavytop.precision import Vector, cross, dot
 from heavytop.top.equations import HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
@@ -58,6 +58,10 @@ def _off_plane(top: HeavyTop, start: State) -> tuple[Fraction, Fraction]:
     return dot(top.moment, axis), dot(start.gamma, axis)
 
 
+def _off_axis(top: HeavyTop, start: State) -> Vector:
+    return cross(top.rotor or (Fraction(0),) * 3, _axis(top, start))
+
+
 @dataclass(frozen=True, slots=True)
 class Pendulum(WithAttitude):
     """Libration, rotation, separatrix and equilibria about any principal axis, |γ| as it is.
@@ -69,7 +73,7 @@ class Pendulum(WithAttitude):
     method = "closed form: physical pendulum, Jacobi functions"
     source = "E. T. Whittaker, Analytical Dynamics, chapter IV"
     body = (TORQUE,)
-    starts = (
+    starts: ClassVar[Conditions] = (
         GAMMA,
         ExactRelation("Omega, or the torque at rest, along a principal axis", "I e x e", _off_principal),
         ExactRelation("P r and gamma across this axis", "P r·e, gamma·e", _off_plane),
@@ -93,10 +97,7 @@ class PendulumGyrostat(Pendulum):
     """
 
     system = HEAVY_GYROSTAT
-    starts = (
-        *Pendulum.starts,
-        ExactRelation("k along this axis", "k x e", lambda top, start: cross(top.rotor or (0, 0, 0), _axis(top, start))),
-    )
+    starts = (*Pendulum.starts, ExactRelation("k along this axis", "k x e", _off_axis))
 
 
 @dataclass(frozen=True, slots=True)
