@@ -98,10 +98,14 @@ def require_new(folder: Path, remedy: str = "Give a new folder with --out.") -> 
 
 
 def cache_folder(name: str) -> Path:
-    """The cache folder of this user; a path that cannot exist for a user without a home."""
-    home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
+    """The cache folder of this user; a path that cannot exist for a user without a home.
+
+    A relative XDG_CACHE_HOME is ignored, as the XDG Base Directory Specification requires.
+    """
+    folders = (Path(os.environ.get(variable, "")) for variable in ("XDG_CACHE_HOME", "LOCALAPPDATA"))
+    home = next(filter(Path.is_absolute, folders), None)
     with suppress(RuntimeError):
-        return (Path(home) if home else Path.home() / ".cache") / "heavytop" / name
+        return (home or Path.home() / ".cache") / "heavytop" / name
     return Path(os.devnull) / "none"
 
 

@@ -135,6 +135,15 @@ def test_rows_come_back_but_for_those_that_were_cut_short_or_damaged(tmp_path: P
     assert not (tmp_path / "out").exists()
 
 
+def test_an_empty_file_of_rows_is_begun_anew(tmp_path: Path) -> None:
+    file = killed(tmp_path / "out", 1)
+    file.write_bytes(b"")
+    with checkpoint(tmp_path / "out") as kept:
+        assert not kept.offsets
+        kept.add(0, row("case 0"))
+        assert [each.case for each in kept.rows([0])] == ["case 0"]
+
+
 @pytest.mark.parametrize("forged", [b"[1]", b'["1", {}]', b"{", b'[1, {"case": 1}]'])
 def test_a_forged_line_with_its_checksum_is_measured_again_or_refused(tmp_path: Path, forged: bytes) -> None:
     file = killed(tmp_path / "out", 3)

@@ -225,8 +225,8 @@ def test_an_integrator_that_ran_out_of_time_twice_is_not_asked_a_third_time(tmp_
     under_way = outcomes.count("out_of_time") - 2
     assert 0 <= under_way < 2
     assert outcomes == ["not_asked"] * (2 - under_way) + ["out_of_time"] * (2 + under_way)
-    (said, *_) = [row.reference.reason for row in found.values() if row.outcome == "not_asked"]
-    assert said.startswith("mine.py:sleeps ran out of time in 2 other rows and was skipped, in ")
+    (said, *_) = [row.against for row in found.values() if row.outcome == "not_asked"]
+    assert said.startswith("nothing: mine.py:sleeps ran out of time in 2 other rows and was skipped, in ")
     assert not all_good(list(found.values()))
 
 

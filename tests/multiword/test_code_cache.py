@@ -10,6 +10,7 @@ import numpy
 import pytest
 
 from heavytop.errors import InputError
+from heavytop.files import cache_folder
 from heavytop.multiword.codegen import code_cache
 from heavytop.multiword.codegen.machine_code import POINTER, Machine, once, pointer
 from support.words_helpers import machine_of
@@ -138,3 +139,9 @@ def test_the_folder_does_not_grow_without_end(folder: Path, monkeypatch: pytest.
 def test_signatures_come_back(folder: Path) -> None:
     first = thrice([])(3)
     assert thrice([])(3).signatures == first.signatures == {"f": ["void", "double*"]}
+
+
+def test_a_relative_folder_of_caches_is_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", "caches")
+    monkeypatch.delenv("LOCALAPPDATA", raising=False)
+    assert cache_folder("code") == Path.home() / ".cache" / "heavytop" / "code"

@@ -113,7 +113,7 @@ class Checkpoint:
             self.check()
             for leftover in self.directory.glob(".*.partial"):
                 leftover.unlink()
-            if not self.path.exists():
+            if not self.path.exists() or not self.path.stat().st_size:
                 replace(self.path, [line(msgspec.json.encode(self.identity))])
             # unbuffered: the system has the row when add returns, and a failed write leaves no buffer that fails again
             self._file = cleanup_on_error.enter_context(self.path.open("r+b", buffering=0))

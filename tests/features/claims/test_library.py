@@ -2,7 +2,8 @@
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 
 import claim_library
 import heavytop as ht
+from heavytop.features.claims import command
 from heavytop.features.claims.audit import audit as auditing
 from heavytop.features.claims.audit.audit import claim_from_table
 from heavytop.features.claims.library import entry as entries
@@ -176,8 +178,19 @@ def test_names_and_twins_are_checked(folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_an_unknown_tag_is_refused_and_a_known_one_selects(folder: Path) -> None:
-    assert in_process.heavytop("claims", "--tag", "lagrange").returncode == 0
+def test_an_unknown_tag_is_refused_and_a_known_one_selects(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    put(folder, HEAD | CLAIM | {"tags": ["spinning"]})
+    counts: list[int] = []
+
+    @contextmanager
+    def counted(_: str, count: int, *__: object) -> Iterator[Callable[[], None]]:
+        counts.append(count)
+        yield lambda: counts.append(counts.pop() - 1)
+
+    monkeypatch.setattr(command, "counted", counted)
+    listed = in_process.heavytop("claims", "--tag", "spinning", "--json")
+    assert [each["id"] for each in json.loads(listed.stdout)["claims"]] == [HEAD["id"]]
+    assert counts == [0]
     refused = in_process.heavytop("claims", "--tag", "euler")
     assert refused.returncode == 2
     assert "lagrange" in refused.stderr

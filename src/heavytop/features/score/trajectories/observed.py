@@ -389,8 +389,6 @@ class Observed:
             pivot, start = floats(self.convention.pivot), _start(self.start, self.posed)
         except OverflowError:
             return None
-        if not all(numpy.isfinite(values).all() for values in columns.values()):
-            return None
         of = body.centre if point is None else floats(point)
         count = min(map(len, columns.values()), default=0)
         reading = Reading.of(self.convention)
