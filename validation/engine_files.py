@@ -71,6 +71,9 @@ class Engine:
     samples: int = 40
     about: str = "pivot"
     reset: int = 0
+    rotor: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    gyroscopic: np.ndarray = field(default_factory=lambda: np.ones(3))
+    """Factors of the gyroscopic moment: 1, but for a fault."""
 
     def about_pivot(self) -> np.ndarray:
         """The tensor that the motion has."""
@@ -83,7 +86,7 @@ class Engine:
         inverse, moment = np.linalg.inv(tensor), self.mass * self.gravity * self.centre
 
         def change(r: np.ndarray, w: np.ndarray) -> np.ndarray:
-            return inverse @ (cross(tensor @ w, w) + cross(r[2], moment))
+            return inverse @ (self.gyroscopic * cross(tensor @ w + self.rotor, w) + cross(r[2], moment))
 
         r, w, h = self.rotation, self.omega, self.step
         steps, rotations, omegas = [0], [r], [w]

@@ -264,6 +264,8 @@ def test_angles_of_many_turns_are_known_at_once(angle: str, place: int) -> None:
         ((1, 1e-30, 1), "pivot", None),  # a rod along its axis, rounded
         ((1, 1, 2, "1/2", 0, 0), "pivot", "-0.207107, 1, 1.20711"),
         ((1, 3, 1), "centre of mass", "1, 1, 3"),
+        *(((0.1, 0.3 + off, 0.2), "centre of mass", None) for off in (-4e-8, 4e-8)),  # a plate in seven digits
+        ((0.1, 0.3001, 0.2), "centre of mass", "0.1, 0.2, 0.3001"),
     ],
 )
 def test_a_tensor_that_is_none_about_the_centre_of_mass_is_a_warning(inertia, about, diagonal) -> None:

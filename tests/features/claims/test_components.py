@@ -173,6 +173,7 @@ def test_a_component_that_does_not_move_has_no_equation_of_the_second_order() ->
     assert audited(CIRCLE | {"start": start, "component": component}).verdict == "undecided"
 
 
+@pytest.mark.slow
 def test_the_start_gives_the_gyrostats_energy_to_a_gyrostat() -> None:
     """A sphere with a rotor about axis 2, for which the energy of a heavy top is not constant."""
     table = CIRCLE | {

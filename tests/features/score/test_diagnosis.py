@@ -7,13 +7,16 @@ import numpy as np
 import pytest
 
 from heavytop.cases import CASES
+from heavytop.features.score.diagnose import hypotheses
 from heavytop.features.score.diagnose.diagnosis import diagnose
 from heavytop.features.score.diagnose.samples import motion
 from heavytop.features.score.diagnose.search import Diagnosis
 from heavytop.features.score.text import diagnosis_text, sentence
+from heavytop.integrate.heyoka.engines import compiled
 from heavytop.measure.scalar import roundings
-from heavytop.precision import DOUBLE, QUAD
-from heavytop.top.equations import HEAVY_TOP, Parameters, heavy_top
+from heavytop.precision import DOUBLE, QUAD, cross
+from heavytop.top.attitude import rotation_of
+from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, Parameters, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State
 
 SHIFT = Fraction(1, 7)
@@ -427,3 +430,34 @@ def test_the_digits_are_those_of_the_error_that_is_printed_beside_them(left: flo
 def test_moments_that_fit_a_body_say_their_point() -> None:
     assert "I11 = 1.6, moments about the fixed point" in diagnosis_text(Diagnosis("top", {"I11": "1.6"}, 1.0, 1e-9))
     assert "I1 = 1.6;" in diagnosis_text(Diagnosis("top", {"I1": "1.6"}, 1.0, 1e-9))
+
+
+def test_weights_of_one_are_the_equations_of_the_gyrostat_in_any_axes() -> None:
+    """Exactly; and each term with the weight 0 is left out, with -1 it has the other sign."""
+    k, y = (Fraction(1, 3), Fraction(-2), Fraction(5)), [Fraction(n, 7) for n in (3, -2, 5, 1, 6, -4)]
+    axes = tuple(rotation_of((Fraction(1), Fraction(2), Fraction(-1), Fraction(3))))
+    given = Parameters((Fraction(2), Fraction(3), Fraction(4)), (Fraction(1), Fraction(-2), Fraction(1, 2)), k)
+    plain = HEAVY_GYROSTAT.field(given, y)
+
+    def weighted(weights: list[int]) -> tuple[Fraction, ...]:
+        numbers = (*k, *(entry for row in axes for entry in row), *map(Fraction, weights))
+        return hypotheses._weighted(given._replace(rotor=numbers), y)
+
+    assert weighted([1] * 18) == plain
+    without_gyroscopic = weighted([0] * 3 + [1] * 15)
+    assert without_gyroscopic[:3] == tuple(
+        t / i for t, i in zip(cross(y[3:], given.moment), given.inertia, strict=True)
+    )
+    assert without_gyroscopic[3:] == plain[3:]
+    assert weighted([1] * 12 + [-1] * 6) == (*plain[:3], *(-rate for rate in plain[3:]))
+    assert weighted([1] * 9 + [-1] * 3 + [1] * 6) == (*(-rate for rate in plain[:3]), *plain[3:])
+    assert len(set(map(weighted, ([1] * n + [0] + [1] * (17 - n) for n in range(18))))) == 18
+
+
+@pytest.mark.slow
+def test_equations_that_differ_in_their_weights_are_compiled_once() -> None:
+    systems = [
+        hypotheses._Weighted("weighted", hypotheses._weighted, HEAVY_TOP.angular_velocity, numbers=(weight,))
+        for weight in (-1.0, 0.0)
+    ]
+    assert compiled(systems[0], DOUBLE) is compiled(systems[1], DOUBLE)
