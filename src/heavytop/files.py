@@ -88,6 +88,7 @@ def readable(path: Path | str, remedy: str, *errors: type[Exception]) -> Iterato
     try:
         yield
     except caught as error:
+        remedy = "Save it as UTF-8." if isinstance(error, UnicodeDecodeError) else remedy
         raise InputError(f"{path} cannot be read: {why(error)}.", remedy) from None
 
 

@@ -95,6 +95,7 @@ IN_FILE = [
      Log(VECTORS, spoil=lambda columns, _: {"omega": columns["gamma"], "gamma": columns["omega"]}), {}),
     ("gyroscopic_sign", replace(FINE, gyroscopic=-np.ones(3), rotor=np.array([0.4, -0.2, 0.3])),
      Log(keys={"rotor": "0.4, -0.2, 0.3"}), {}),
+    ("gyroscopic_missing", replace(FINE, gyroscopic=np.zeros(3)), Log(), {}),
     ("term_missing", replace(FINE, gyroscopic=np.array([1, 0, 1])), Log(),
      {"column": "M2", "term": "the gyroscopic term"}),
     ("steiner", replace(FINE, tensor=FINE.tensor + STEINER), Log(keys=RIGHT), {"times": "2"}),

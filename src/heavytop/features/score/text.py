@@ -176,6 +176,7 @@ _SENTENCES = {
     "rows_late": "Each state belongs to the previous time: the states are one row late",
     "kinematic_sign": "The states solve γ' = Ω × γ, with the opposite sign",
     "gyroscopic_sign": "The states solve M' = Ω × M + P γ × r, with the opposite sign of M × Ω",
+    "gyroscopic_missing": "The states solve M' = P γ × r, without the gyroscopic term M × Ω",
     "both_signs": "The states solve M' = Ω × M + P γ × r and γ' = Ω × γ, with opposite signs of M × Ω and γ × Ω",
     "rows_reversed": "The states are listed from the last time to the first",
     "axes_permuted": "The axes are permuted or reversed: {columns_said}",

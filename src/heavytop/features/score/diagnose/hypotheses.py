@@ -486,7 +486,13 @@ _TERMS = (
     ("γ", _GAMMA[1:], "γ{1} Ω{0}"),
 )
 """Of each term the vector whose derivative it enters, its rows of weights, and its text from the two other axes."""
-_SIGNS = {"kinematic_sign": _GAMMA, "gyroscopic_sign": _GYROSCOPIC, "both_signs": (*_GYROSCOPIC, *_GAMMA)}
+_SIGNS = {
+    "kinematic_sign": (_GAMMA, -1.0),
+    "gyroscopic_sign": (_GYROSCOPIC, -1.0),
+    "both_signs": ((*_GYROSCOPIC, *_GAMMA), -1.0),
+    "gyroscopic_missing": (_GYROSCOPIC, 0.0),
+}
+"""Rows of the weights of whole equations, and their weight."""
 
 
 def _of_field(
@@ -513,7 +519,7 @@ def of_equations(run: Examined, truth: Array) -> Iterator[Hypothesis]:
         hypotheses += [*_any_order(run, truth), *_axes_of_space(run, truth)]
     error = float(run.errors(truth).max())
     if run.system in WITH_ATTITUDE:
-        hypotheses += [_of_field(run, kind, {}, rows) for kind, rows in _SIGNS.items()]
+        hypotheses += [_of_field(run, kind, {}, rows, weight=weight) for kind, (rows, weight) in _SIGNS.items()]
     yield from hypotheses
     nothing = all(hypothesis.left() * FITTED_DROP > error for hypothesis in hypotheses)
     if run.system in WITH_ATTITUDE and error > _ANOTHER_MOTION and nothing:

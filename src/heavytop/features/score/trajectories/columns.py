@@ -63,14 +63,14 @@ _SAID = re.compile(r"[\[(]\s*([^\[\]()]*?)\s*[\])]$|^[^\[(/]*/\s*(.+)$")
 """Unit in the last brackets of a name, or behind its first slash."""
 _A_SECOND = ("/s", "/sec", "/second", "s-1")
 _SECOND = {
-    "ms": Fraction(1, 10**3),
-    "ns": Fraction(1, 10**9),
-    "us": Fraction(1, 10**6),
-    "μs": Fraction(1, 10**6),
-    "min": Fraction(60),
+    **dict.fromkeys(("ms", "msec", "milliseconds"), Fraction(1, 10**3)),
+    **dict.fromkeys(("us", "μs", "usec", "microseconds"), Fraction(1, 10**6)),
+    **dict.fromkeys(("ns", "nsec", "nanoseconds"), Fraction(1, 10**9)),
+    **dict.fromkeys(("min", "minutes"), Fraction(60)),
 }
 _RATE = {
     **{f"{unit}{second}": Fraction(1, 180) for unit in ("deg", "degree", "degrees", "°") for second in _A_SECOND},
+    "dps": Fraction(1, 180),
     **dict.fromkeys(("rpm", "rev/min", "r/min"), Fraction(1, 30)),
 }
 _METRE = {"mm": Fraction(1, 10**3), "cm": Fraction(1, 100)}
@@ -130,7 +130,7 @@ def header(names: Sequence[str], joint: str = "") -> Header:
 
     joint: of columns qpos and qvel, "free" or "ball".
     """
-    names = with_quaternion([canonical(name, joint) for name in names])
+    written, names = names, with_quaternion([canonical(name, joint) for name in names])
     indices: dict[str, dict[str, int]] = {}
     time, angles, others = None, set(), []
     units: dict[str, set[Unit]] = {}
@@ -141,7 +141,7 @@ def header(names: Sequence[str], joint: str = "") -> Header:
             continue
         if plain in _TIME:
             if time is not None:
-                raise InputError("The column t occurs twice.", "Give each column once.")
+                raise _twice("t", written[time], written[index])
             time = index
             units["t"] = {_unit("t", name)}
             continue
@@ -153,7 +153,7 @@ def header(names: Sequence[str], joint: str = "") -> Header:
         if component in indices.setdefault(quantity, {}):
             of_state = quantity in ("omega", "gamma")
             label = f"{quantity}{_AXES.get(component, component)}" if of_state else quoted(name)
-            raise InputError(f"The column {label} occurs twice.", "Give each column once.")
+            raise _twice(label, written[indices[quantity][component]], written[index])
         indices[quantity][component] = index
         units.setdefault(quantity, set()).add(_unit(quantity, name))
         if quantity == "euler" and (unit := _UNIT.search(name.strip())):
@@ -166,6 +166,11 @@ def header(names: Sequence[str], joint: str = "") -> Header:
         _require_no_quantity(name, indices)
     unknown = tuple(text for quantity in units.keys() & _UNITS.keys() for text in _unknown(quantity, units[quantity]))
     return Header(time, indices, "".join(angles), tuple(others), _in_one_unit(units), unknown)
+
+
+def _twice(column: str, one: str, other: str) -> InputError:
+    both = "" if one == other else f", as {quoted(one.strip())} and {quoted(other.strip())}"
+    return InputError(f"The column {column} occurs twice{both}.", "Keep one of them.")
 
 
 def _quaternion(names: Sequence[str], plain: Sequence[str]) -> dict[str, int]:

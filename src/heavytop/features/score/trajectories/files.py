@@ -115,6 +115,8 @@ def read_table(text: str, started: bool = False) -> tuple[dict[str, Any], list[s
         columns = {"times": times_written, "header": meaning, "cells": cells, "lines": lines}
     else:
         places = meaning.of_state()
+        if meaning.time is None and observed_columns.is_more_than_states(meaning):
+            raise InputError("No column holds the times.", "Call it t, or t [ms] for milliseconds.")
         if missing := [name for name in COLUMNS if name not in places]:
             raise _no_header(missing, names)
         unused = [name for index, name in enumerate(names) if index not in places.values()]
@@ -132,13 +134,15 @@ def _lines(text: str) -> tuple[dict[str, str | list[str]], list[list[str]], list
     body: list[str] = []
     for number, line in enumerate(text.splitlines(), 1):
         stripped = line.strip()
-        if stripped.startswith(_COMMENT):
-            comment = stripped.lstrip("#%!/ ")
+        padded = stripped.rstrip(",; ")  # of a spreadsheet, which quotes a cell with commas
+        comment = padded[1:-1] if padded[:1] == padded[-1:] == '"' else padded
+        if comment.startswith(_COMMENT):
+            comment = comment.lstrip("#%!/ ")
             if not body and not _take_key(comment, keys):
                 comments.append(_cells(comment, None))
                 if stripped.startswith("%time"):  # of rostopic, in nanoseconds
                     comments[-1][0] = "%time"
-        elif stripped:
+        elif stripped and not re.fullmatch("sep=.", stripped):  # a declaration for spreadsheets
             body.append(stripped)
             lines.append(number)
     return keys, comments, lines, body
@@ -202,7 +206,7 @@ def unread(names: Sequence[str], header: Sequence[str]) -> list[str]:
     """The note on columns that are not read, except ξ and radii, which heavytop writes itself."""
     columns = {name.strip() for name in header}
     own = {"xi1", "xi2", "xi3"} | {f"{name}_radius" for name in columns}
-    more = [name for name in names if name.strip() not in own]
+    more = [name for name in names if name.strip() not in {"", *own}]
     return [f"ignored columns: {', '.join(name[:40] for name in more[:6])}"] if more else []
 
 
@@ -243,13 +247,15 @@ def _is_header(names: list[str], width: int) -> bool:
 
 def _split(body: list[str], lines: list[int], separator: str | None, width: int) -> list[list[str]]:
     """The cells of every row; raises InputError that names the line of one with another number than the header."""
-    rows = []
+    rows: list[list[str]] = []
     for number, line in zip(lines, body, strict=True):
         spaced = separator is None and _DECIMAL_COMMAS.match(line)
         cells = _cells(line.replace(",", ".") if spaced else line, separator)
         if len(cells) != width:
             decimal_commas = separator == "," and len(cells) == 2 * width
             remedy = "For decimal commas, separate the columns by semicolons." if decimal_commas else _ALL_COLUMNS
+            if not rows and not decimal_commas:
+                remedy = "Begin each line above the names of the columns with #, and name every column."
             raise InputError(f"Line {number} has {len(cells)} columns, not {width}.", remedy)
         # where a semicolon, a tab or a space separates, a comma is the point of a decimal
         rows.append([cell.replace(",", ".") for cell in cells] if separator in (";", "\t") else cells)
@@ -496,6 +502,8 @@ def _about(document: dict[str, Any], stem: str, case: Case | None, broken: bool)
     word = _text(document, "outcome", "success")
     if word not in [outcome.value for outcome in Outcome]:
         raise InputError(f"Unknown outcome {word[:60]!r}.", f"Use {', '.join(outcome.value for outcome in Outcome)}.")
+    if "step" in document and written_numbers.finite(document["step"], "step") <= 0:
+        raise refusal("step", "positive", document["step"], "Give the step of the method, or leave the key out.")
     return {
         "name": named(_text(document, "name", stem if case is None else case.name), "name"),
         "integrator": named(_text(document, "integrator", "given"), "integrator"),

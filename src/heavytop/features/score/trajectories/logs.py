@@ -33,11 +33,13 @@ _OF_BODY = r"(?:_(?:rs|s|b|ib|bn|body|local|imu))*"
 _ALIASES = tuple(
     (re.compile(rf"(?:.*[./_])?{pattern}", re.IGNORECASE), name)
     for pattern, name in (
-        (r"(?:quat(?:ernion)?|orientation|rotation|attitude)[./_]([wxyz])", "q{}"),
-        (r"(?:position|translation|pos)[./_]([xyz])|t([xyz])", "p{}"),
-        (rf"(?:angular_?velocity|angular|angvel|ang_vel|gyro(?:scope)?){_OF_BODY}[./_]([xyz])", "w{}"),
-        (rf"w{_OF_BODY}[./_]?([xyz])", "w{}"),
-        (r"(?:sim_?time|time_?s(?:ec(?:onds?)?)?|t_s(?:ec)?|seconds|elapsed(?:_?(?:s|secs?|seconds?))?)", "t"),
+        (r"(?:quat(?:ernion)?|orientation|rotation|attitude)(?:_w)?[./_]([wxyz])", "q{}"),
+        (r"(?:position|translation|pos)(?:_w)?[./_]([xyz])|t([xyz])", "p{}"),
+        (r"ang_?vel_w_([xyz])", "omega_space_{}"),  # of Isaac: _w_ is the world
+        (rf"(?:angular_?velocity|angular|angvel|ang_vel){_OF_BODY}[./_]([xyz])", "w{}"),
+        (rf"gyr(?:o(?:scope)?)?{_OF_BODY}[./_ ]?([xyz])", "w{}"),
+        (rf"(?<!vel_)(?<!acc_)(?<!force_)(?<!torque_)w{_OF_BODY}[./_]?([xyz])", "w{}"),
+        (r"(?:sim_?time|time_?s(?:ec(?:onds?)?)?|t_s(?:ec)?|seconds|elapsed(?:[_ ]?(?:s|secs?|seconds?|time))?)", "t"),
         (r"(?:timestamp|stamp|__time)", "timestamp"),
         (r"(?:receive|publish|log|record)_?time", "epoch"),
         (r"(?:timestamp|stamp)_?(ns|us|ms)", "timestamp [{}]"),
@@ -102,6 +104,11 @@ def require_understood(names: Sequence[str], others: Sequence[str], quantities: 
             "The columns rx, ry, rz are ambiguous: a rotation vector, angles, or a position.",
             "Add the line `# attitude: rotation vector` above the columns, or call a position px, py, pz.",
         )
+    if "an angular velocity" in missing and {"gx", "gy", "gz"} <= {name.strip().lower() for name in names}:
+        raise InputError(
+            "The columns gx, gy, gz are ambiguous: Ω of a gyroscope, or γ.",
+            "Call them omega1, omega2, omega3, or gamma1, gamma2, gamma3.",
+        )
     for name in others:
         looks = next((what for what in missing if _LOOKS[what].search(name)), None)
         if looks and not _OTHER.match(name):
@@ -157,7 +164,7 @@ def with_one_time(
         apart = f"The column {plain[index]} has integers {decimal_text(second - first, 12)} apart, and no unit."
         raise InputError(apart, f"Name the column {plain[index]} [us], [ms] or [ns], or [s] for seconds.")
     unit = names[index][1:].strip(" []()")
-    if first == 0 or (started and abs(first) < _TEN_DAYS * _PER_SECOND.get(unit, 1)):
+    if first == 0 or (started and abs(first) < _TEN_DAYS * _PER_SECOND.get(unit[:2], 1)):
         return names, cells, []
     note = f"times are counted from the first row, {decimal_text(first, 20)}{_kept([row[index] for row in cells])}"
     for row in cells:

@@ -24,7 +24,6 @@ from heavytop.precision import (
     cross,
     decimal_text,
     dot,
-    exact,
     number,
     round_to,
     shown,
@@ -268,12 +267,8 @@ class GivenTrajectory:
 
     @property
     def step(self) -> Fraction | None:
-        """The step of the method, where the file gives it as a number."""
-        try:
-            step = exact(self.flags.get("step", "0"))
-        except InputError:
-            return None
-        return step if step > 0 else None
+        """The step of the method, where the file gives it."""
+        return written_numbers.number(self.flags["step"], "step") if "step" in self.flags else None
 
     def warnings(self) -> list[str]:
         """Warnings of data that no rigid body has, and of γ that suggests another order of the columns."""
