@@ -39,6 +39,7 @@ FAMILIES = {
     "pendulum": Family("pendulum", 20),
     "pendulum with a rotor": Family("pendulum", 9, "random_gyrostat"),
     "spherical": Family("spherical_and_tilted", 16, "random_spherical"),
+    "spherical gyrostat": Family("spherical_and_tilted", 9, "random_spherical_gyrostat"),
     "pendulum about a tilted axis": Family("spherical_and_tilted", 12, "random_tilted"),
     "pendulum of a spherical body": Family("spherical_and_tilted", 12, "random_spherical_pendulum"),
     "sretensky": Family("sretensky", 5, attitude=False),

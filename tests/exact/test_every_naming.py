@@ -38,6 +38,7 @@ MOTIONS += [("generic", *GENERIC, HEAVY_TOP)]
 MOTIONS += [(name, top, start, GYROSTAT) for name, (top, start) in GYROSTATS.items()]
 HEAVY_GYROSTATS = {
     "ZhukovskyVolterra": HeavyTop((3, 2, 1), 0, (0, 0, 0), ("1/2", "-1/3", "3/4")),
+    "SphericalGyrostat": HeavyTop((2, 2, 2), 1, (1, 2, 2), ("1/2", 1, 1)),
     "LagrangeGyrostat": HeavyTop((3, 3, 1), 1, (0, 0, "2/3"), (0, 0, "-1/2")),
 }
 MOTIONS += [(name, top, GENERIC[1], HEAVY_GYROSTAT) for name, top in HEAVY_GYROSTATS.items()]

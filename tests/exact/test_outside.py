@@ -70,6 +70,8 @@ OUTSIDE = [
     ("Pendulum", (B, 1, (4, -3, 1)), ((3, 4, 0), (4, "-11/4", 2)), "P r·e = 0, gamma·e = 1/4"),
     ("Pendulum", (B, 1, (1, 2, 3)), ((0, 0, 0), UNIT), "the torque at rest, along a principal axis"),
     ("PendulumGyrostat", ((3, 2, 1), 1, SIDE, (1, 0, "1/9")), ((1, 0, 0), UP), "k along this axis"),
+    ("SphericalGyrostat", ((2, 2, 2), 1, (1, 2, 3), (2, 4, "25/4")), ((1, 2, 3), UNIT), r"k x P r = \(-1/2, "),
+    ("SphericalGyrostat", ((2, 2, "13/7"), 0, (0, 0, 0), (1, 2, 3)), ((1, 2, 3), UNIT), "I2 - I3 = 1/7"),
     ("SphericalTop", ((2, 2, "13/7"), 1, (1, 2, 3)), ((1, 2, 3), UNIT), "I2 - I3 = 1/7"),
     ("SphericalTop", ((2, 2, 2), 0, (1, 2, 3)), ((1, 2, 3), UNIT), "P r != 0"),
     ("Sretensky", (G, 1, (1, 0, 0), (0, 1, 1)), (("3/4", "1/2", -1), UP), "k1 = k2 = 0, but k1 = 0, k2 = 1"),

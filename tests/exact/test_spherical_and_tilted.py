@@ -7,7 +7,7 @@ from time import process_time
 
 import pytest
 
-from heavytop.exact.cases.lagrange import Lagrange, SphericalTop
+from heavytop.exact.cases.lagrange import Lagrange, SphericalGyrostat, SphericalTop
 from heavytop.exact.cases.pendulum import Pendulum
 from heavytop.exact.catalogue import find
 from heavytop.precision import cross, dot
@@ -34,6 +34,16 @@ def random_spherical(seed):
     rng = random.Random(seed)
     inertia = [positive(rng)] * 3
     return SphericalTop(HeavyTop(inertia, rng.choice((1, -2)), triple(rng)), State(triple(rng), triple(rng)))
+
+
+def random_spherical_gyrostat(seed):
+    """The rotor along the centre of mass, or anywhere without a weight."""
+    plain, rng = random_spherical(seed), random.Random(seed)
+    factor = rational(rng, size=3)
+    rotor = [factor * c for c in plain.top.centre] if seed % 3 else triple(rng)
+    return SphericalGyrostat(
+        HeavyTop(plain.top.inertia, plain.top.weight if seed % 3 else 0, plain.top.centre, rotor), plain.start
+    )
 
 
 def random_spherical_pendulum(seed):

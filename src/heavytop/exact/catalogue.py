@@ -25,7 +25,7 @@ from heavytop.exact.cases.grioli import Grioli
 from heavytop.exact.cases.gyrostat import Gyrostat
 from heavytop.exact.cases.hess import Hess, HessPendulum
 from heavytop.exact.cases.kovalevskaya import Kovalevskaya
-from heavytop.exact.cases.lagrange import Lagrange, LagrangeGyrostat, SphericalTop
+from heavytop.exact.cases.lagrange import Lagrange, LagrangeGyrostat, SphericalGyrostat, SphericalTop
 from heavytop.exact.cases.one_interval import Steklov
 from heavytop.exact.cases.pendulum import Pendulum, PendulumGyrostat
 from heavytop.exact.cases.staude import Staude
@@ -103,6 +103,7 @@ _CLASSES: dict[str, tuple[Class, ...]] = {
         _steady(HEAVY_GYROSTAT),
         Class.of(PendulumGyrostat, _KEEP),
         Class.of(LagrangeGyrostat, CYCLIC),
+        Class.of(SphericalGyrostat, _KEEP),
         Class.of(ZhukovskyVolterra, _KEEP),
         Class.of(Sretensky, CYCLIC),
     ),

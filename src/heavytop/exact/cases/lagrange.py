@@ -32,12 +32,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from flint import acb, arb, fmpq_poly
 
 from heavytop.exact.closed_form import (
     ClosedForm,
+    about,
     across,
     balls,
     cached_per_precision,
@@ -64,7 +65,7 @@ from heavytop.exact.flint.balls import (
     rational,
     series_length,
 )
-from heavytop.exact.solution import AXIAL_ROTOR, SPHERICAL, SYMMETRIC, TORQUE
+from heavytop.exact.solution import AXIAL_ROTOR, SPHERICAL, SYMMETRIC, TORQUE, Conditions, ExactRelation
 from heavytop.precision import Vector, cross, dot
 from heavytop.top.equations import HEAVY_GYROSTAT, Parameters, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State
@@ -273,13 +274,12 @@ class SphericalTop(Lagrange):
         return across(axis), axis
 
 
-# Lagrange's gyrostat: I1 = I2, n and k along axis 3: a Lagrange top seen from axes that turn about its axis.
+# Gyrostats with n and k along one axis of symmetry: a top without a rotor seen from axes that turn about it.
 #
-# M3 = I3 Ω3 + k3 is constant.  The top with the same moments and weight and the spin Ω3 + k3/I3 has the same M, so that
-# its axis and γ move in space as those of the gyrostat do, and its body turns ahead by the angle (k3/I3) t: with Rz the
-# rotation about axis 3,
+# The top with the same moments and weight and Ω* = Ω + c, c_i = k_i/I_i, has the same M, so that its axis and γ move in
+# space as those of the gyrostat do, and its body turns ahead by the angle |c| t: with R the rotation about k,
 #
-#     Ω = Rz(k3 t/I3) Ω* − (k3/I3) e3,   γ = Rz(k3 t/I3) γ*,   ξ = Rz(k3 t/I3) ξ*
+#     Ω = R(|c| t) Ω* − c,   γ = R(|c| t) γ*,   ξ = R(|c| t) ξ*
 
 
 _ATTITUDE_BITS = 8
@@ -295,37 +295,58 @@ class LagrangeGyrostat(ClosedForm):
     method = "closed form: Lagrange's gyrostat, Weierstrass functions of gamma3"
     source = "derived in the program; Lagrange's top with a rotor on its axis"
     system = HEAVY_GYROSTAT
-    body = *SYMMETRIC, AXIAL_ROTOR
+    body: ClassVar[Conditions] = (*SYMMETRIC, AXIAL_ROTOR)
 
     @property
-    def _ahead(self) -> Fraction:
-        """k3/I3."""
-        return Fraction(self.top.rotor[2] / self.top.inertia[2]) if self.top.rotor else Fraction(0)
+    def ahead(self) -> Vector:
+        """k_i/I_i."""
+        first, second, third = (k / i for k, i in zip(self.top.rotor or (_ZERO,) * 3, self.top.inertia, strict=True))
+        return first, second, third
 
     def evaluate(self, time: Fraction) -> list[BallLike]:
         rotated = self._turned(_top_of(self).evaluate(time), instant(time))
-        return [*rotated[:2], rotated[2] - ball(self._ahead), *rotated[3:]]
+        return [*(w - c for w, c in zip(rotated, _ahead(self)[0], strict=False)), *rotated[3:]]
 
     def xi_at(self, time: Fraction) -> list[arb]:
         xi = _top_of(self).attitude(time, current_precision() + _ATTITUDE_BITS)
         return self._turned(xi, ball(time))
 
     def _turned(self, vectors: Sequence[Balls], time: Balls) -> list[Balls]:
-        """Rz(k3 t/I3) of each three components."""
-        sine, cosine = (time * ball(self._ahead)).sin_cos()
+        """R(|c| t) of each three components."""
+        _, speed, axis = _ahead(self)
+        sine, cosine = (time * speed).sin_cos()
         rotated: list[Any] = []
         for begin in range(0, len(vectors), 3):
-            x, y, z = vectors[begin : begin + 3]
-            rotated += [cosine * x - sine * y, sine * x + cosine * y, z]
+            rotated += about(axis, cosine, -sine, vectors[begin : begin + 3])
         return rotated
+
+
+@dataclass(frozen=True, slots=True)
+class SphericalGyrostat(LagrangeGyrostat):
+    """The motion of a spherical gyrostat with its rotor along the centre of mass, or any rotor if it has no weight.
+
+    Raises NotInClass unless I1 = I2 = I3 and k ∥ P r.
+    """
+
+    method = "closed form: spherical gyrostat, Weierstrass functions of n·gamma"
+    source = "derived in the program; the spherical top with a rotor along the centre of mass"
+    body = SPHERICAL, ExactRelation("k along P r", "k x P r", lambda top, _: cross(top.rotor or top.moment, top.moment))
+
+
+@cached_per_precision
+def _ahead(case: LagrangeGyrostat) -> tuple[list[arb], arb, list[arb]]:
+    """c, |c| and the unit vector along it; without a rotor any one."""
+    ahead, speed = balls(case.ahead), ball(dot(case.ahead, case.ahead)).sqrt()
+    return ahead, speed, [c / speed for c in ahead] if any(case.ahead) else balls((_ONE, _ZERO, _ZERO))
 
 
 @once
 def _top_of(case: LagrangeGyrostat) -> Lagrange:
     """The motion of the top with the same M."""
-    first, second, third = case.start.omega
     plain = HeavyTop(case.top.inertia, case.top.weight, case.top.centre)
-    return Lagrange(plain, State((first, second, third + case._ahead), case.start.gamma))
+    omega = [w + c for w, c in zip(case.start.omega, case.ahead, strict=True)]
+    spherical = isinstance(case, SphericalGyrostat) and any(plain.moment)
+    return (SphericalTop if spherical else Lagrange)(plain, State(omega, case.start.gamma))
 
 
 # A top with I1 = I2 and P c = 0, in units near 1 and rotated so that its moment of weight is (c, 0, 0).
