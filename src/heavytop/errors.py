@@ -31,6 +31,7 @@ _TYPES = {
 }
 
 
+_WHOLE = "the file"
 _options: ContextVar[Mapping[str, str]] = ContextVar("_options", default={})  # noqa: B039 - never changed in place
 
 
@@ -64,7 +65,7 @@ def invalid(error: Exception, kind: type | None = None) -> str:
     kind: the record type of the file, which defines the allowed texts of a key.
     """
     text, _, path = str(error).partition(" - at `$")
-    path = path.strip("`.") or "the file"
+    path = path.strip("`.") or _WHOLE
     if match := re.fullmatch(r"Expected `([^`]*)`, got `(\w+)`", text):
         expected = " or ".join(_TYPES.get(name, name) for name in match[1].split(" | ") if name != "null")
         # decimals of a plan are text
@@ -75,19 +76,35 @@ def invalid(error: Exception, kind: type | None = None) -> str:
         return f"{path} must be {_TYPES.get(match[1], match[1])} {what}{match[2]} {match[3]}"
     if match := re.fullmatch(r"Object missing required field `(.*)`", text):
         return f"{path} lacks the key {match[1]}"
-    if match := re.fullmatch(r"Object contains (unknown field `.*`)", text):
-        return f"{match[1]} in {path}"
+    if match := re.fullmatch(r"Object contains unknown field `(.*)`", text, re.DOTALL):
+        records = [part for part in _parts(_hint(kind, path)) if hasattr(part, "__struct_encode_fields__")]
+        near = nearest(match[1], records[0].__struct_encode_fields__) if len(records) == 1 else ""
+        return f"unknown field `{quoted(match[1])[1:-1]}` in {path}" + (f"; the nearest key is {near}" if near else "")
+    if text.startswith("Expected `str` matching regex"):
+        return f"{path} must be {_rule(kind, path)}"
     if (match := re.fullmatch(r"Invalid enum value (.*)", text)) and (words := _words(kind, path)):
         return f"{path} = {match[1]}: {' or '.join(filter(None, (', '.join(words[:-1]), words[-1])))}"
     return str(error)
 
 
+def _hint(kind: Any, path: str) -> Any:
+    """The type of the key at ``path`` in a record; None if there is no such key."""
+    for key in re.findall(r"[A-Za-z_]\w*", path.removeprefix(_WHOLE)):
+        record = next((part for part in _parts(kind) if key in getattr(part, "__annotations__", {})), None)
+        kind = get_type_hints(record, include_extras=True)[key] if record else None
+    return kind
+
+
 def _words(kind: Any, path: str) -> list[str]:
     """The allowed texts of the key at ``path`` in a record; empty if there is no such key."""
-    for key in re.findall(r"[A-Za-z_]\w*", path):
-        record = next((part for part in _parts(kind) if key in getattr(part, "__annotations__", {})), None)
-        kind = get_type_hints(record)[key] if record else None
-    return [*(["true", "false"] if bool in _parts(kind) else []), *(part for part in _parts(kind) if type(part) is str)]
+    parts = _parts(_hint(kind, path))
+    return [*(["true", "false"] if bool in parts else []), *(part for part in parts if type(part) is str)]
+
+
+def _rule(kind: Any, path: str) -> str:
+    """The description of the pattern of the key at ``path`` in a record."""
+    descriptions = (getattr(part, "description", None) for part in _parts(_hint(kind, path)))
+    return next((text for text in descriptions if isinstance(text, str)), "of another form")
 
 
 def _parts(kind: Any) -> list[Any]:

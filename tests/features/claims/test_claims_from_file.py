@@ -4,15 +4,18 @@ import json
 import time
 import tomllib
 from importlib.resources import files
+from io import StringIO
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from heavytop.errors import InputError
-from heavytop.features.claims.audit.audit import read_claim
+from heavytop.features.claims.audit.audit import claim_from_table, read_claim
 from heavytop.features.claims.audit.guard import in_time
 from heavytop.features.claims.audit.judge import Audit
-from support.claim_tables import audited
+from heavytop.features.claims.text import audit_text
+from support.claim_tables import audited, integral, top
 from support.in_process import heavytop
 
 EXAMPLES = files("heavytop.features.claims") / "examples"
@@ -131,6 +134,40 @@ def test_the_command_prints_the_json_that_scripts_read():
     text = heavytop("audit", EXAMPLES / "lagrange-wrong-sign.toml").stdout
     assert "Witnesses" in text
     assert "(1.1) 1" in text
+
+
+WRONG_KEYS = [
+    ({"parameters": {"I-1": "2"}}, "A name must be a letter and up to 30 of .*; got 'I-1'"),
+    ({"parameters": {"\x1b[31m": "2"}}, r"A name must be .*; got '\\x1b\[31m'"),
+    ({"definitions": {"": "2"}}, "A name must be .*; got ''"),
+    ({"parameters": {"A": "2", "B": 2}}, "parameters.B must be text or a list; got an integer"),
+    ({"definitions": {"A": "2", "B": ["2"]}}, "definitions.B must be text; got a list"),
+    ({"parameter": {"A": "2"}}, "unknown field `parameter` in the file; the nearest key is parameters"),
+    ({"top": top() | {"center": ["0", "0", "1"]}}, "unknown field `center` in top; the nearest key is centre"),
+    ({"top": top() | {"\x1b[31m": "1"}}, r"unknown field `\\x1b\[31m` in top\."),
+    ({"id": "An id"}, "id must be lower-case words joined by hyphens"),
+]
+
+
+@pytest.mark.parametrize(("parts", "said"), WRONG_KEYS)
+def test_a_wrong_key_is_named_in_words(parts, said):
+    entry = {"title": "A title", "language": "en", "read": "the text", "status": "as published", "expects": "holds"}
+    source = {"authors": ["A"], "year": 2000, "title": "T"}
+    claim = integral("Omega3", top("2 2 1", "0 0 1")) | (
+        entry | {"note": "N", "source": source} if "id" in parts else {}
+    )
+    with pytest.raises(InputError, match=said) as caught:
+        claim_from_table(({"name": "x"} if "id" not in parts else {}) | claim | parts, "x")
+    assert "\x1b" not in str(caught.value)
+
+
+def test_the_name_and_the_source_of_a_claim_are_printed_without_control_characters():
+    report = audited(integral("Omega3", top("2 2 1", "0 0 1"), name="a\x1b[31m\nb", source="\x07s\u202e"))
+    (console := Console(file=StringIO(), width=80)).print(audit_text(report))
+    printed = console.file.getvalue()
+    assert "a [31m b as a first integral" in printed
+    assert not set(printed) & set("\x07\x1b\u202e")
+    assert "\x1b" not in repr(report)
 
 
 def test_a_file_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:

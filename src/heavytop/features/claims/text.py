@@ -112,11 +112,11 @@ _RESIDUAL = 20
 
 def audit_text(report: Audit) -> RenderableType:
     """The verdict, a table of the equations, witnesses, conditions and the explanation."""
-    head = Text(f"{report.claim} as {ABOUT[report.kind]} of {report.system}: ")
+    head = Text(f"{clip(report.claim, 80)} as {ABOUT[report.kind]} of {report.system}: ")
     head.append(report.verdict, style=_STYLES[report.verdict])
     parts: list[RenderableType] = [head]
     if report.source:
-        parts.append(Text(report.source))
+        parts.append(Text(clip(report.source, 2_000)))
     parts += [Text(f"{name} = {value}") for name, value in report.constants if name != value]
     if report.kind == "motion":
         parts.append(Text(_SYMBOLS))
@@ -144,8 +144,8 @@ def _entry(report: Audit) -> list[RenderableType]:
     expected = "as expected" if report.verdict == entry.expects else f"{entry.expects} was expected"
     return [
         Text(),
-        Text(f"Read: {entry.read}. Status: {entry.status}. Verdict: {expected}."),
-        Text(" ".join(entry.note.split())),
+        Text(f"Read: {clip(entry.read, 600)}. Status: {entry.status}. Verdict: {expected}."),
+        Text(clip(entry.note, 4_000)),
     ]
 
 

@@ -50,6 +50,7 @@ _TABLES: dict[str, tuple[str, Callable[[ClaimFile], FileClaim]]] = {
     "stability": ("motion", UserStability),
 }
 """The table that each kind of claim needs, and its class."""
+_ANY_TOP = {"inertia": ["1", "1", "1"], "weight": "1", "centre": ["0", "0", "0"]}
 _MAX_BYTES = 100_000
 _REMEDY = "`heavytop docs claims-in-toml` describes the format, with examples."
 
@@ -80,7 +81,7 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> FileClaim | ValueC
     try:
         content = msgspec.convert(claim, ClaimFile)
     except (msgspec.ValidationError, RecursionError) as error:
-        raise InputError(f"{where}: {invalid(error, ClaimFile)}.", _REMEDY) from None
+        raise InputError(f"{where}: {_with_name(invalid(error, ClaimFile), claim)}.", _REMEDY) from None
     if content.kind not in _TABLES:
         raise InputError(f"{where}: kind = {content.kind[:40]!r}.", f"Use {', '.join(_TABLES)} or value.")
     needed, claim_class = _TABLES[content.kind]
@@ -95,6 +96,17 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> FileClaim | ValueC
     content = msgspec.structs.replace(content, entry=entry)
     with prefixed(where):
         return claim_class(content)
+
+
+def _with_name(cause: str, claim: Mapping[str, Any]) -> str:
+    """The cause with the name of the parameter or definition that it is about."""
+    table = cause.partition("[...]")[0]
+    for name, value in claim[table].items() if "[...]" in cause else ():
+        try:
+            msgspec.convert({table: {name: value}, "name": "", "kind": "", "top": _ANY_TOP}, ClaimFile)
+        except msgspec.ValidationError:
+            return cause.replace("[...]", f".{quoted(name)[1:-1]}", 1)
+    return cause
 
 
 def _value_claim(table: Mapping[str, Any], entry: Entry | None, where: str) -> ValueClaim:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -13,7 +14,7 @@ import msgspec
 import sympy
 from flint import arb
 
-from heavytop.errors import InputError, prefixed, quoted
+from heavytop.errors import InputError, prefixed, quoted, refusal
 from heavytop.features.claims.algebra.conditions import (
     ConditionKind,
     Need,
@@ -49,7 +50,6 @@ from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, Parameters, System,
 
 
 Text = Annotated[str, msgspec.Meta(max_length=20_000)]
-Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,30}$")]
 Three = Annotated[list[Text], msgspec.Meta(min_length=3, max_length=3)]
 Tensor = Annotated[list[Text | list[Text]], msgspec.Meta(min_length=3, max_length=9)]
 Samples = Annotated[list[Text], msgspec.Meta(min_length=1, max_length=8)]
@@ -89,7 +89,7 @@ class QuadratureTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     phi, theta, psi: of a component, rates of the angles in the state and u.
     """
 
-    variable: Name
+    variable: str
     time: Text | None = None
     integrand: Text | None = None
     phi: Text | None = None
@@ -145,8 +145,8 @@ class ClaimFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     domain: str = "all"
     times: Samples | None = None
     assume: Annotated[list[Text], msgspec.Meta(max_length=20)] = []
-    parameters: Annotated[dict[Name, Samples | Text], msgspec.Meta(max_length=20)] = {}
-    definitions: Annotated[dict[Name, Text], msgspec.Meta(max_length=40)] = {}
+    parameters: Annotated[dict[str, Samples | Text], msgspec.Meta(max_length=20)] = {}
+    definitions: Annotated[dict[str, Text], msgspec.Meta(max_length=40)] = {}
     relations: Annotated[list[Text], msgspec.Meta(max_length=6)] = []
     motion: ClaimedMotionTable | None = None
     quadrature: QuadratureTable | None = None
@@ -292,6 +292,7 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     variables = tuple(variables)
     reserved = RESERVED.union(map(str, variables))
     for name in (*content.parameters, *content.definitions):
+        _require_name("A name", name)
         if name in content.parameters and name in content.definitions:
             raise InputError(f"The name {name!r} is a parameter and a definition.", "Rename one of them.")
         if name in reserved:
@@ -343,6 +344,13 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     )
     _check_samples(context, compared)
     return replace(context, samples=(*context.samples, *_at_equality(context, compared)))
+
+
+def _require_name(what: str, name: str) -> None:
+    """Raises InputError for a text that no formula can contain as a name."""
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,30}", name):
+        rule = "a letter and up to 30 of a-z, A-Z, 0-9 and _"
+        raise refusal(what, rule, quoted(name), "Rename it, also in the formulas: I1, alpha, k_2.")
 
 
 def sample_number(text: str, what: str) -> Fraction:
@@ -515,6 +523,7 @@ def variable_of(content: ClaimFile) -> sympy.Symbol:
     if content.quadrature is None:
         return TIME
     name = content.quadrature.variable
+    _require_name("quadrature.variable", name)
     if name in RESERVED:
         taken = f"Reserved names: {', '.join(sorted(RESERVED))}."
         raise InputError(f"The name {name!r} of the variable of [quadrature] is reserved.", taken)

@@ -17,7 +17,7 @@ import msgspec
 import sympy
 from flint import arb
 
-from heavytop.display import Tabular, TitledTable
+from heavytop.display import Tabular, TitledTable, printable
 from heavytop.errors import ExitCode
 from heavytop.exact.flint.balls import radius as radius_of
 from heavytop.exact.flint.balls import radius_text, value_text
@@ -151,7 +151,7 @@ class Audit(Tabular):
 
     def _table(self) -> TitledTable:
         lines = [(r.equation, str(r.component or ""), r.branch, r.domain, VERDICTS[r.holds]) for r in self.rows]
-        title = f"{self.claim} as {ABOUT[self.kind]} of {self.system}: {self.verdict}"
+        title = f"{printable(self.claim)} as {ABOUT[self.kind]} of {self.system}: {self.verdict}"
         return TitledTable(title, ("equation", "component", "branch", "domain", "verdict"), lines)
 
 

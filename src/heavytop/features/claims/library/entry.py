@@ -20,12 +20,13 @@ FOLDER = Path(__file__).parent
 _REMEDY = "See `heavytop docs library` for the keys of an entry."
 _KEYS = ("id", "title", "source", "language", "read", "status", "aliases", "tags", "expects", "note", "corrects")
 _ID = r"^[a-z0-9]+(-[a-z0-9]+)*$"
+_LANGUAGE = r"^[a-z]{2,3}$"
 _READ = r"^(the text|an abstract|restated .+)$"
 _STATUS = r"^(as published|corrected here|superseded by [a-z0-9]+(-[a-z0-9]+)*)$"
 
 Verdict = Literal["holds", "refuted", "undecided"]
-Id = Annotated[str, msgspec.Meta(pattern=_ID, max_length=80)]
-Line = Annotated[str, msgspec.Meta(min_length=1, max_length=400, pattern=r"\S")]
+Id = Annotated[str, msgspec.Meta(pattern=_ID, max_length=80, description="lower-case words joined by hyphens")]
+Line = Annotated[str, msgspec.Meta(min_length=1, max_length=400, pattern=r"\S", description="text that is not blank")]
 
 
 class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -61,9 +62,13 @@ class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     id: Id
     title: Line
     source: Source
-    language: Annotated[str, msgspec.Meta(pattern=r"^[a-z]{2,3}$")]
-    read: Annotated[str, msgspec.Meta(pattern=_READ, max_length=600)]
-    status: Annotated[str, msgspec.Meta(pattern=_STATUS)]
+    language: Annotated[str, msgspec.Meta(pattern=_LANGUAGE, description="a code such as en, ru or de")]
+    read: Annotated[
+        str, msgspec.Meta(pattern=_READ, max_length=600, description="'the text', 'an abstract' or 'restated ...'")
+    ]
+    status: Annotated[
+        str, msgspec.Meta(pattern=_STATUS, description="'as published', 'corrected here' or 'superseded by ID'")
+    ]
     expects: Verdict
     note: Annotated[str, msgspec.Meta(min_length=1, max_length=4_000)]
     aliases: Annotated[list[Line], msgspec.Meta(max_length=20)] = []
