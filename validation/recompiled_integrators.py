@@ -45,8 +45,9 @@ from heavytop.precision import exact
 from heavytop.records import SCHEMA, Report, Row
 from heavytop.report.compare.compare import compare
 from heavytop.report.compare.noise import Policy
-from heavytop.report.compare.rows import RowComparison
+from heavytop.report.compare.rows import RowPair
 from heavytop.report.document.document import row_name
+from heavytop.report.document.kind import kind_of
 
 ROOT = Path(__file__).parent
 PLANS = ("gate", "smoke", "selftest", "peers", str(ROOT / "many_kinds.toml"))
@@ -304,7 +305,6 @@ def _is_quick(task: Task, method: str, variant: str) -> bool:
 
 def judged(rows: dict[str, list[Row]], tally: Tally) -> None:
     """Every pair of variants, both ways."""
-    rule = RowComparison(Policy(), KINDS, False, True)
     for first, second in combinations(rows, 2):
         keys = {row.identity for row in rows[first]} & {row.identity for row in rows[second]}
         if not keys:
@@ -328,7 +328,7 @@ def judged(rows: dict[str, list[Row]], tally: Tally) -> None:
                 match = b.metrics.get(name)
                 if match is None or metric.log10 is None or match.log10 is None:
                     continue
-                if rule._is_truncation(metric, match, a, b):
+                if RowPair(a, b, kind_of(a, KINDS)).is_truncation(metric, match):
                     tally.truncated += 1
                     part = 10 ** abs(match.log10 - metric.log10) - 1
                     tally.moved = max(tally.moved, (part, f"{row_name(a.identity)} {name}; {first} and {second}"))

@@ -458,6 +458,11 @@ class Row(msgspec.Struct, frozen=True, gc=False, kw_only=True):
         """The key of the row without version, and its names."""
         return Identity(self.key.of_version(""), self.case, self.integrator)
 
+    def has_identity_of(self, other: Row) -> bool:
+        """Whether both have the same identity, which need not be made."""
+        names, others = (self.case, self.integrator), (other.case, other.integrator)
+        return names == others and self.key.of_version("") == other.key.of_version("")
+
     def metric(self, name: str, component: str = "", statistic: str = "") -> Metric | None:
         """The metric of that quantity, or None."""
         return self.metrics.get(Quantity(name, component, statistic).text)

@@ -12,11 +12,11 @@ import degraded_integrators as degraded
 from degraded_integrators import HEALTHY, Method, marked_worse, report_of, verdict
 from heavytop.features.kinds import KINDS
 from heavytop.harness.rows import computed
+from heavytop.measure.rounding_bound import RoundingBound
 from heavytop.measure.rounding_noise import some_of
 from heavytop.records import Against, Data, Metric, Quantity, Row, Series
 from heavytop.report.compare.noise import (
     Policy,
-    RoundingBound,
     Rule,
     apart,
     noisier,
@@ -35,7 +35,7 @@ NAMES = ("drift_energy_max", "solution_error_omega_max")
 
 
 def bound(kind: str = "drift", **changes) -> RoundingBound:
-    return RoundingBound(row(**{"data": FREE, "steps": 10, **changes}), KINDS[kind])
+    return RoundingBound(row(**{"data": FREE, "steps": 10, **changes}), KINDS[kind].largest_amplification)
 
 
 def edge(found: RoundingBound, name: str, component: str) -> float:

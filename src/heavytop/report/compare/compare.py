@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
@@ -99,27 +99,27 @@ def compare(
     missing: list[tuple[int, Row]] = []
     motions: list[WorseMotions | None] = []
     changes = Changes()
-    timed = _timed(policy, baseline.environment, candidate.environment)
-    repeated = _same_machine_and_versions(baseline.environment, candidate.environment)
+    environments = baseline.environment, candidate.environment
+    timed, repeated = _timed(policy, *environments), _same_machine_and_versions(*environments)
     checked = isinstance(baseline, Brief), isinstance(candidate, Brief)
     if isinstance(baseline, Brief) and isinstance(candidate, Brief):
         candidate.rows.twins = baseline.rows
     rows = RowComparison(policy, kinds, timed, list_same, checked, repeated)
     unmatched = _UnmatchedRows(candidate.rows)
     for row in baseline.rows:
-        match = unmatched.take(identity := row.identity)
-        if match is not None:
-            findings_by_row.append(changes.add(row, match, rows.compare(identity, row, match)))
+        if (match := unmatched.take(row)) is not None:
+            findings_by_row.append(changes.add(row, match, rows.compare(row, match)))
             if folders is not None and not rows.ignores(row):
                 motions.append(kind_of(row, kinds).join(row, match, folders, partial(rows.limits, row)))
         elif not rows.ignores(row):
             missing.append((len(findings_by_row), row))
-            lacking = Finding(identity, "", Verdict.MISSING, row.outcome, None, "the row is missing")
-            findings_by_row.append([lacking])
+            findings_by_row.append([])
     for index, row in missing:
-        if (match := unmatched.take_elsewhere(row.identity)) is not None:
-            findings_by_row[index] = rows.compare(row.identity, row, match)[:1]
-        changes.add(row, match, findings_by_row[index])
+        if (match := unmatched.take_elsewhere(row)) is not None:
+            findings = rows.compare(row, match)[:1]
+        else:
+            findings = [Finding(row.identity, "", Verdict.MISSING, row.outcome, None, "the row is missing")]
+        findings_by_row[index] = changes.add(row, match, findings)
     for row in unmatched.left():
         if not rows.ignores(row):
             new = Finding(row.identity, "", Verdict.NEW, None, row.outcome)
@@ -146,29 +146,30 @@ class _UnmatchedRows:
     """The rows of the candidate, taken by identity in one pass: two reports of one plan have the same order."""
 
     def __init__(self, rows: Any) -> None:
-        self._rows = rows
+        self._rows: Sequence[Row] = rows
         self._remaining = enumerate(rows)
         self._passed: dict[Identity, int] = {}
         self._by_elsewhere: dict[Identity, list[Identity]] | None = None
 
-    def take(self, identity: Identity) -> Row | None:
-        if identity in self._passed:
-            row: Row = self._rows[self._passed.pop(identity)]
-            return row
-        for number, row in self._remaining:
-            if row.identity == identity:
-                return row
-            self._passed[row.identity] = number
+    def take(self, row: Row) -> Row | None:
+        """The remaining row of the same identity, or None."""
+        if self._passed and (index := self._passed.pop(row.identity, None)) is not None:
+            return self._rows[index]
+        other: Row
+        for index, other in self._remaining:
+            if other.has_identity_of(row):
+                return other
+            self._passed[other.identity] = index
         return None
 
-    def take_elsewhere(self, identity: Identity) -> Row | None:
+    def take_elsewhere(self, row: Row) -> Row | None:
         """The remaining row that differs in its horizon alone, if there is exactly one; called after the pass."""
         if self._by_elsewhere is None:
             self._by_elsewhere = {}
-            for row in self._passed:
-                self._by_elsewhere.setdefault(row.elsewhere, []).append(row)
-        near = self._by_elsewhere.get(identity.elsewhere, [])
-        return self.take(near.pop()) if len(near) == 1 else None
+            for identity in self._passed:
+                self._by_elsewhere.setdefault(identity.elsewhere, []).append(identity)
+        near = self._by_elsewhere.get(row.identity.elsewhere, [])
+        return self._rows[self._passed.pop(near.pop())] if len(near) == 1 else None
 
     def left(self) -> Iterator[Row]:
         """The rows that were not taken."""

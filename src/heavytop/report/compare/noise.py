@@ -14,8 +14,6 @@ import math
 import re
 import tomllib
 from fnmatch import translate
-from fractions import Fraction
-from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
@@ -25,11 +23,8 @@ from heavytop.errors import InputError, invalid
 from heavytop.files import read_whole, readable
 from heavytop.measure.scorer import SOLUTION_ERROR
 from heavytop.precision import exact, log10, physical
-from heavytop.records import Metric, Quantity, Row
+from heavytop.records import Metric, Row
 from heavytop.report.document.kind import ReportedKind
-from heavytop.top.amplification import FOLLOWED, amplification, rate
-from heavytop.top.equations import Parameters, System, holding, largest, system
-from heavytop.top.heavy_top import HeavyTop, State
 
 # Policies: when two numbers count as the same, by default or by a TOML file of rules.  docs/compare.md shows every key.
 
@@ -214,112 +209,6 @@ def glob(pattern: str) -> re.Pattern[str]:
     if not pattern or pattern.count("[") > pattern.count("]"):
         raise InputError(f"A pattern must be a glob; got {pattern!r}.", "Use *, ? and [...], such as drift_*_max.")
     return re.compile(translate(pattern))
-
-
-# The largest error that rounding explains in a row, from the row's own body, start and horizon.
-#
-# The roundings of n steps add up like a random walk, while the body rotates and the motion amplifies the error.  So in
-# units of the quantity an error may be rounding noise up to
-#
-#     100 · eps · √max(n, τ) · max(τ, A),    τ = 1 + rate · |horizon|,
-#
-# which is 100 · eps · τ^1.5 on a regular motion with one step per unit of its own time, and more by the amplification A
-# (:mod:`heavytop.top.amplification`) beyond τ.  A is computed from the data of the row, only where the other factors do
-# not suffice.  The drift of a first integral neither rotates nor is amplified: 100 · eps · √max(n, τ).
-
-
-MARGIN = 2.0
-"""Decades above the mean size of the accumulated roundings of a run."""
-_EXCESS_RATE = 0.5
-"""Fraction by which the rate of amplification of a chaotic motion may exceed its mean beyond the reach of double."""
-_DRIFT = "drift"
-_RELATIONS = ("hess", "goryachev_chaplygin")
-"""Conserved on one level set alone: the motion amplifies deviations from it."""
-
-
-class RoundingBound:
-    """Bounds of the rounding errors of a row, as log10.
-
-    row: of the trusted side of a comparison, the baseline.  Without body and start its rate counts as 1, and its
-    amplification is the one stated in the row.
-    """
-
-    def __init__(self, row: Row, kind: ReportedKind) -> None:
-        self.row = row
-        self.kind = kind
-
-    def explains(self, quantity: Quantity | None, size: float) -> bool:
-        """Whether rounding explains an error of that quantity, or a difference of two, of size 10^size."""
-        roundings = max(self._tau, float(self.row.steps))
-        bound = MARGIN + (1 - self.row.bits) * BITS + math.log10(roundings) / 2 + self._unit(quantity)
-        if quantity is not None and quantity.name == _DRIFT and quantity.component not in _RELATIONS:
-            return size <= bound
-        bound += math.log10(self._tau)
-        if size <= bound:
-            return True
-        amplified = min(self._amplified(self.row.horizon), math.log10(self.kind.largest_amplification))
-        return size <= bound + max(0.0, amplified - math.log10(self._tau))
-
-    def explains_times(self, time: str, part: float) -> bool:
-        """Whether rounding explains that an escape at ``time`` comes earlier by that fraction of it.
-
-        An error that grows like the amplification A(t), about e^(rate t), reaches a threshold earlier by ln(100)/rate
-        where it is 100 times as large; one may be 100 times larger than the mean, another 100 times smaller.
-        """
-        return part * self._amplified(time) <= 2 * MARGIN
-
-    @cached_property
-    def _case(self) -> tuple[HeavyTop, State, System, Parameters] | None:
-        data = self.row.data
-        if data is None or not data.omega or not data.gamma:
-            return None
-        try:
-            inertia, centre, rotor, omega, gamma = (
-                tuple(map(exact, part)) for part in (data.inertia, data.centre, data.rotor, data.omega, data.gamma)
-            )
-            top, start = HeavyTop(inertia, exact(data.weight), centre, rotor or None), State(omega, gamma)
-            which = system(self.row.system)
-            return top, start, which, which.parameters(top, start)
-        except InputError:
-            return None
-
-    @property
-    def _motion(self) -> tuple[System, Parameters, tuple[Fraction, ...]] | None:
-        return None if self._case is None else (*self._case[2:], tuple(self._case[1].flat))
-
-    @cached_property
-    def _rate(self) -> Fraction:
-        return Fraction(1) if self._motion is None else rate(*self._motion)
-
-    @cached_property
-    def _tau(self) -> float:
-        return 1 + float(min(self._rate * abs(exact(self.row.horizon)), Fraction(10**300)))
-
-    def _amplified(self, horizon: str) -> float:
-        """log10 of A up to a time."""
-        if self._motion is None:
-            return math.log10(self.row.amplification or 1.0)
-        decades = math.log10(amplification(*self._motion, exact(horizon)))
-        return decades + _EXCESS_RATE * max(0.0, decades - math.log10(FOLLOWED))
-
-    def _unit(self, quantity: Quantity | None) -> float:
-        """log10 of the size of a quantity along the motion."""
-        turning = max(math.log10(self._rate) if self._rate else 0.0, 0.0)
-        if quantity is None or self._motion is None:
-            return turning
-        if quantity.name == _DRIFT:
-            return self._integral(quantity.component)
-        if quantity.component == "omega":
-            return math.log10(self._rate) if self._rate else 0.0
-        return 0.0 if quantity.component == "gamma" else turning
-
-    def _integral(self, name: str) -> float:
-        """log10 of the size of the terms of a first integral."""
-        assert self._case is not None
-        top, start, which, p = self._case
-        integral = next((integral for integral in holding(top, start, which) if integral.name == name), None)
-        size = Fraction(0) if integral is None else largest(integral, p, self._rate)
-        return (log10(size) or 0.0) if size else 0.0
 
 
 _BY_CHANCE = 1.4

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import lru_cache
-from itertools import chain
+from functools import cached_property, lru_cache
 from operator import sub
 from statistics import median
 from typing import Any, Literal
@@ -16,6 +15,7 @@ import msgspec
 
 from heavytop.integrate.registry import is_third_party
 from heavytop.measure.growth import BENT, CLASSES, Interval
+from heavytop.measure.rounding_bound import RoundingBound
 from heavytop.measure.rounding_noise import least
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import exact
@@ -38,7 +38,6 @@ from heavytop.report.compare.noise import (
     Limits,
     Lookup,
     Policy,
-    RoundingBound,
     allowed_loss,
     apart,
     noisier,
@@ -58,6 +57,7 @@ from heavytop.report.compare.verdicts import (
     judge_outcomes,
     judge_repeated,
     judge_seconds,
+    judge_support,
     log_of,
     size,
     weaker,
@@ -242,7 +242,7 @@ def judge_series(old: Series, new: Series, allowed: float, floor: float, exactly
 
 _STEPS = 2
 """Factor: beyond this ratio of steps, or of evaluations of the field, the method must be another one."""
-_OTHER_QUANTITY: Judged = (Verdict.INCOMPARABLE, "it is declared as a different quantity")
+OTHER_QUANTITY: Judged = (Verdict.INCOMPARABLE, "it is declared as a different quantity")
 
 
 class Finding(msgspec.Struct, frozen=True, gc=False):
@@ -300,6 +300,61 @@ class Finding(msgspec.Struct, frozen=True, gc=False):
 
 
 @dataclass
+class RowPair:
+    """A row of the baseline and the same row of the candidate, with the kind of both."""
+
+    old: Row
+    new: Row
+    kind: ReportedKind
+
+    @cached_property
+    def key(self) -> Identity:
+        """The identity of both, with the two versions of a program that has them."""
+        versions = self.old.key.subject.version, self.new.key.subject.version
+        return self.old.identity._replace(versions=versions if all(versions) else ())
+
+    @cached_property
+    def bound(self) -> RoundingBound:
+        """The bound of the rounding errors of both."""
+        return RoundingBound(self.old, self.kind.largest_amplification)
+
+    def eps(self, quantity: Quantity | None) -> float:
+        """log10 of the eps of the rows, or of the sum of their roundings."""
+        return (1 - self.old.bits) * BITS + self.kind.roundings(quantity, self.old.steps)
+
+    def noise(self, name: str, limits: Limits) -> float:
+        """Decades by which noise may move a series or its law: those of the metrics that summarize it."""
+        metrics = (of_starts(metric, self.old) for metric in summaries(self.old, name, "max", "rms", "final"))
+        widest = max((allowed_loss(metric, metric) for metric in metrics if metric.band), default=0.0)
+        return limits.noise * max(widest, self.kind.assumed_band(self.old.key.subject))
+
+    def is_by_rounding(self, metric: Metric, match: Metric) -> bool:
+        """Whether rounding alone explains both errors, in a row whose noise was not measured."""
+        if self.old.flags.get(NOISE) != NOT_MEASURED or None in (metric.log10, match.log10) or metric.kind != "error":
+            return False
+        largest = max(size(metric), size(match))
+        return self.kind.noise_is_reruns(metric) and self.bound.explains(metric.quantity, largest)
+
+    def is_truncation(self, metric: Metric, match: Metric) -> bool:
+        """Whether two errors differ by truncation: with the same steps, by more than rounding explains.
+
+        Without a requested step size and without reruns that measure rounding noise, equal evaluations show that the
+        steps are the same: they include the steps that step control rejects.
+        """
+        old, new, subject = self.old, self.new, self.old.key.subject
+        if metric.kind != "error" or metric.log10 is None or match.log10 is None:
+            return False
+        reruns = metric.band is not None and self.kind.noise_is_reruns(metric)
+        same_steps = (old.steps, old.evaluations) == (new.steps, new.evaluations)
+        if not (same_steps and (subject.step or (old.steps and (old.evaluations or reruns)))):
+            return False
+        if not (reruns or self.kind.assumed_band(subject)):
+            return False
+        low, high = sorted((metric.log10, match.log10))
+        return not self.bound.explains(metric.quantity, apart(low, high - low))
+
+
+@dataclass
 class RowComparison:
     """Compares rows under one policy.
 
@@ -320,7 +375,6 @@ class RowComparison:
 
     def __post_init__(self) -> None:
         self.lookup = Lookup(self.policy)
-        self._bound: RoundingBound | None = None
 
     def ignores(self, row: Row) -> bool:
         """Whether a rule ignores the whole row: one whose pattern matches every metric."""
@@ -330,93 +384,89 @@ class RowComparison:
         """The limits of a metric of a row."""
         return self.lookup(row.key.kind, row.case, metric)
 
-    def compare(self, key: Identity, old: Row, new: Row) -> list[Finding]:
-        """All findings about a row that both reports have.  key: its identity in the baseline."""
-        versions = old.key.subject.version, new.key.subject.version
-        key = key._replace(versions=versions) if all(versions) else key
-        if UNSUPPORTED in (old.outcome, new.outcome) and (verdict := _judge_support(old, new)) is not None:
-            return [] if self.ignores(old) else self._whole_row(key, old, new, *verdict)
+    def compare(self, old: Row, new: Row) -> list[Finding]:
+        """All findings about a row that both reports have."""
+        pair = RowPair(old, new, kind_of(old, self.kinds))
+        ignored = self.ignores(old)
         if (judged := self._outcomes(old, new)) is not None:
-            return [] if self.ignores(old) else [*self._whole_row(key, old, new, *judged), *self._limits(key, old, new)]
+            return [] if ignored else [*self._whole_row(pair, judged), *self._limits(pair)]
         if reason := self._incomparable(old, new):
-            if self.ignores(old):
-                return []
-            return [Finding(key, "", Verdict.INCOMPARABLE, old.outcome, new.outcome, reason)]
-        if new.outcome != SUCCESS and not self.ignores(old):
+            return [] if ignored else self._whole_row(pair, (Verdict.INCOMPARABLE, reason))
+        if new.outcome != SUCCESS and not ignored:
             self.failed.append(new)
-        findings = self._metrics(key, old, new)
+        findings = self._metrics(pair)
         if old.laws or new.laws:
-            findings += self._laws(key, old, new)
-        if old.series:
-            findings += self._series(key, old, new)
-        if not self.ignores(old):
-            findings += self._row(key, old, new)
-        if self.repeated and BAND in old.seconds:
-            findings += self._repeated(key, old, new)
-        elif self.timed:
-            findings += self._seconds(key, old, new)
+            findings += self._laws(pair)
+        if old.series is not new.series:
+            findings += self._series(pair)
+        if not ignored:
+            findings += self._row(pair)
+        if self.timed or self.repeated:
+            findings += self._seconds(pair)
         return findings
 
-    def _whole_row(self, key: Identity, old: Row, new: Row, verdict: Verdict, why: str) -> list[Finding]:
-        """The finding about a row judged by its outcome."""
-        if verdict is Verdict.SAME and new.outcome != UNSUPPORTED:
-            self.failed.append(new)
-        if verdict is Verdict.SAME and not self.list_same:
+    def _whole_row(self, pair: RowPair, judged: Judged) -> list[Finding]:
+        """The finding about a row that is judged as a whole."""
+        if judged[0] is Verdict.SAME and pair.new.outcome != UNSUPPORTED:
+            self.failed.append(pair.new)
+        if judged[0] is Verdict.SAME and not self.list_same:
             self.same += 1
             return []
-        return [Finding(key, "", verdict, old.outcome, new.outcome, why)]
+        return [Finding(pair.key, "", judged[0], pair.old.outcome, pair.new.outcome, judged[1])]
 
     def _outcomes(self, old: Row, new: Row) -> Judged | None:
         """The verdict on rows of one motion of which at least one did not reach the horizon; None else."""
-        if old.outcome == new.outcome == SUCCESS or old.key.horizon != new.key.horizon:
+        if old.outcome == new.outcome == SUCCESS:
             return None
-        if other_request(old, new) or (None not in (old.data, new.data) and other_data(old.data, new.data)):
+        if UNSUPPORTED in (old.outcome, new.outcome) and (support := judge_support(old, new)) is not None:
+            return support
+        if old.key.horizon != new.key.horizon or other_request(old, new):
+            return None
+        if None not in (old.data, new.data) and other_data(old.data, new.data):
             return None
         judged = judge_outcomes(old, new, self.lookup.usual.duration)
         return judged if judged is None or not (why := self._inconsistent(old, new)) else (Verdict.INCOMPARABLE, why)
 
-    def _limits(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
+    def _limits(self, pair: RowPair) -> Iterator[Finding]:
         """Findings of metrics beyond their limits in a row that has no numbers in the baseline."""
-        if new.outcome == SUCCESS and self.policy.rule:
-            for name, metric in new.metrics.items():
-                limits = self.limits(old, name)
+        if pair.new.outcome == SUCCESS and pair.old.outcome != UNSUPPORTED and self.policy.rule:
+            for name, metric in pair.new.metrics.items():
+                limits = self.limits(pair.old, name)
                 if not limits.ignore and (judged := beyond_limit(metric, limits)) is not None:
-                    yield Finding(key, name, judged[0], None, metric.value, judged[1])
+                    yield Finding(pair.key, name, judged[0], None, metric.value, judged[1])
 
-    def _metrics(self, key: Identity, old: Row, new: Row) -> list[Finding]:
-        usual, kind = self.lookup.usual, kind_of(old, self.kinds)
-        lost = bool(old.reference.until)
+    def _metrics(self, pair: RowPair) -> list[Finding]:
+        old, new, usual = pair.old, pair.new, self.lookup.usual
         findings = []
         for name, metric in old.metrics.items():
             match, limits = new.metrics.get(name), self.limits(old, name)
-            if limits is usual and match is not None and self._is_plainly_same(kind, metric, match, old, new, lost):
+            if limits is usual and match is not None and self._is_plainly_same(pair, metric, match):
                 if self.list_same:
-                    findings.append(Finding(key, name, Verdict.SAME, metric.value, match.value))
+                    findings.append(Finding(pair.key, name, Verdict.SAME, metric.value, match.value))
                 else:
                     self.same += 1
             elif not limits.ignore:
                 if match is None:
-                    findings.append(Finding(key, name, Verdict.MISSING, metric.value, None, "the metric is missing"))
+                    lacking = Finding(pair.key, name, Verdict.MISSING, metric.value, None, "the metric is missing")
+                    findings.append(lacking)
                     continue
-                verdict, why = self._metric(metric, match, limits, old, new)
+                verdict, why = self._metric(pair, metric, match, limits)
                 slight = (  # a loss of truncation alone
                     verdict is Verdict.WORSE
                     and limits.truncation < size(match) - size(metric) <= limits.loss
                     and beyond_limit(match, limits) is None
-                    and self._is_truncation(metric, match, old, new)
+                    and pair.is_truncation(metric, match)
                 )
-                findings.append(Finding(key, name, verdict, metric.value, match.value, why, slight=slight))
+                findings.append(Finding(pair.key, name, verdict, metric.value, match.value, why, slight=slight))
         if new.metrics.keys() != old.metrics.keys():
             findings += [
-                Finding(key, name, Verdict.NEW, None, metric.value)
+                Finding(pair.key, name, Verdict.NEW, None, metric.value)
                 for name, metric in new.metrics.items()
                 if name not in old.metrics and not self.limits(old, name).ignore
             ]
         return findings
 
-    def _is_plainly_same(
-        self, kind: ReportedKind, metric: Metric, match: Metric, old: Row, new: Row, lost: bool
-    ) -> bool:
+    def _is_plainly_same(self, pair: RowPair, metric: Metric, match: Metric) -> bool:
         """Whether two errors without a rule differ by less than the smallest allowance, as most errors do.
 
         Then neither truncation nor step control matter, which :meth:`_metric` considers.
@@ -429,139 +479,134 @@ class RowComparison:
             return False
         if -allowed <= before - after <= allowed and (band == new_band or (new_band or math.inf) < (band or 0.0)):
             return True
-        if band is not None and old.starts == new.starts == 1:
+        if band is not None and pair.old.starts == pair.new.starts == 1:
             allowed = max(allowed, min(STEP_CONTROL, usual.noise * allowed_loss(metric, match)))
-        if abs(before - after) > allowed or metric.bound or match.bound or noisier(kind, metric, match, lost):
+        if abs(before - after) > allowed or metric.bound or match.bound:
+            return False
+        if noisier(pair.kind, metric, match, bool(pair.old.reference.until)):
             return False
         if metric.quantity is None or metric.quantity.statistic != "final":
             return True
-        return abs(max(before, least(old.metrics, metric)) - max(after, least(new.metrics, match))) <= allowed
+        old, new = pair.old.metrics, pair.new.metrics
+        return abs(max(before, least(old, metric)) - max(after, least(new, match))) <= allowed
 
-    def _metric(self, metric: Metric, match: Metric, limits: Limits, old: Row, new: Row) -> Judged:
+    def _metric(self, pair: RowPair, metric: Metric, match: Metric, limits: Limits) -> Judged:
         """The verdict by the values, then by the noise of the candidate: worse where it exceeds chance, and value and
         noise together exceed those of the baseline.
         """
+        old, new, kind = pair.old, pair.new, pair.kind
         if new.outcome != SUCCESS and metric.value == match.value in (NAN, MISSING):
             return SAME  # both stopped before the first value
-        least_of = least(old.metrics, metric), least(new.metrics, match)
-        kind = kind_of(old, self.kinds)
-        bound = self._bound_of(old) if (metric.band or match.band) and kind.noise_is_reruns(metric) else None
+        smallest = least(old.metrics, metric), least(new.metrics, match)
+        bound = pair.bound if (metric.band or match.band) and kind.noise_is_reruns(metric) else None
         old_banded, new_banded = of_starts(metric, old), of_starts(match, new)
-        truncated = self._is_truncation(metric, match, old, new)
+        truncated = pair.is_truncation(metric, match)
         assumed = 0.0 if truncated else kind.assumed_band(old.key.subject)
         noise = assumed if metric.band is None else kind.least_band(old.starts)
         if noise > (old_banded.band or 0.0):
             old_banded = msgspec.structs.replace(old_banded, band=noise)
-        eps = self._eps(metric.quantity, old)
         allowed = msgspec.structs.replace(limits, loss=limits.truncation) if truncated else limits
-        judged = judge(old_banded, new_banded, allowed, eps, least_of, bound)
+        judged = judge(old_banded, new_banded, allowed, pair.eps(metric.quantity), smallest, bound)
         changed = judged[0] in (Verdict.WORSE, Verdict.BETTER) and limits.noise and not beyond_limit(match, limits)
-        if changed and self._is_by_rounding(metric, match, old):
+        if changed and pair.is_by_rounding(metric, match):
             return SAME
         if judged[0] in (Verdict.WORSE, Verdict.INCOMPARABLE):
             return judged
         if judged[0] is Verdict.SAME and metric.quantity != match.quantity:
-            return _OTHER_QUANTITY
+            return OTHER_QUANTITY
         if metric.band is not None and match.band is None and match.log10 is not None:
             return Verdict.INCOMPARABLE, f"its noise is not measured (was {metric.band:.2g} decades)"
         wider = noisier(kind, metric, match, bool(old.reference.until))
-        if wider and reaches_further(metric, match, least_of, limits.loss):
+        if wider and reaches_further(metric, match, smallest, limits.loss):
             return Verdict.WORSE, f"noise: {metric.band:.2g} → {match.band:.2g} decades"
         return judged
 
-    def _laws(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
-        summed = _by_series(old)
-        for name in dict.fromkeys((*old.laws, *new.laws)):
-            limits = self.limits(old, f"growth {name}")
+    def _laws(self, pair: RowPair) -> Iterator[Finding]:
+        olds, news, series, new_series = pair.old.laws, pair.new.laws, pair.old.series, pair.new.series
+        for name in dict.fromkeys((*olds, *news)):
+            limits = self.limits(pair.old, f"growth {name}")
             if limits.ignore:
                 continue
-            a, b = old.laws.get(name), new.laws.get(name)
-            judged: Judged
-            if a is None or b is None:
-                judged = (Verdict.MISSING, "the law is missing") if b is None else (Verdict.NEW, "")
+            old, new = olds.get(name), news.get(name)
+            if old is None or new is None:
+                judged = (Verdict.MISSING, "the law is missing") if new is None else (Verdict.NEW, "")
             else:
                 # an equal series has equal roundings, so that a different law of it is not chance
-                rerun = name in old.series and name in new.series and old.series[name] != new.series[name]
-                judged = judge_law(a, b, self._noise(summed.get(name, {}), old, limits), rerun)
-                if judged[0] is Verdict.SAME and a.quantity != b.quantity:
-                    judged = _OTHER_QUANTITY
-            before, after = (None if law is None else law_text(law) for law in (a, b))
-            yield Finding(key, name, judged[0], before, after, judged[1], "growth")
+                rerun = name in series and name in new_series and series[name] != new_series[name]
+                judged = judge_law(old, new, pair.noise(name, limits), rerun)
+                if judged[0] is Verdict.SAME and old.quantity != new.quantity:
+                    judged = OTHER_QUANTITY
+            before, after = (None if law is None else law_text(law) for law in (old, new))
+            yield Finding(pair.key, name, judged[0], before, after, judged[1], "growth")
 
-    def _series(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
+    def _series(self, pair: RowPair) -> Iterator[Finding]:
         """Findings of series that changed; equal ones give none."""
-        if old.series is new.series:
-            return
-        summed = _by_series(old)
-        for name, series in old.series.items():
-            limits = self.limits(old, f"series {name}")
-            match = new.series.get(name)
-            if limits.ignore or match == series:
+        for name, old in pair.old.series.items():
+            limits, new = self.limits(pair.old, f"series {name}"), pair.new.series.get(name)
+            if limits.ignore or new == old:
                 continue
-            if match is None:
-                before = f"{len(series.values)} samples kept"
-                yield Finding(key, name, Verdict.MISSING, before, None, "it is missing", "series")
-                continue
-            metrics = summed.get(name, {})
-            exactly = any(metric.kind == "value" for part in ("max", "final") for metric in metrics.get(part, ()))
-            allowed = limits.value if exactly else max(limits.loss, self._noise(metrics, old, limits))
-            floor = limits.floor + self._eps(series.quantity, old)
-            judged = judge_series(series, match, allowed, floor, exactly)
-            if judged[0] is Verdict.WORSE and not exactly and limits.noise:
-                matches = _by_series(new).get(name, {})
-                largest = list(zip(metrics.get("max", ()), matches.get("max", ()), strict=False))
-                if largest and all(self._is_by_rounding(*pair, old) for pair in largest):
-                    judged = judge_series(series, match, math.inf, floor, exactly)
-            if judged[0] is Verdict.SAME and series.quantity != match.quantity:
-                judged = _OTHER_QUANTITY
+            judged = (
+                (Verdict.MISSING, "it is missing") if new is None else self._judge_series(pair, name, old, new, limits)
+            )
             if judged[0] is not Verdict.SAME:
-                counts = [f"{len(samples.values)} samples kept" for samples in (series, match)]
-                yield Finding(key, name, judged[0], counts[0], counts[1], judged[1], "series")
+                before, after = (None if one is None else f"{len(one.values)} samples kept" for one in (old, new))
+                yield Finding(pair.key, name, judged[0], before, after, judged[1], "series")
 
-    def _row(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
+    def _judge_series(self, pair: RowPair, name: str, old: Series, new: Series, limits: Limits) -> Judged:
+        exactly = any(metric.kind == "value" for metric in summaries(pair.old, name, "max", "final"))
+        allowed = limits.value if exactly else max(limits.loss, pair.noise(name, limits))
+        floor = limits.floor + pair.eps(old.quantity)
+        judged = judge_series(old, new, allowed, floor, exactly)
+        if judged[0] is Verdict.WORSE and not exactly and limits.noise:
+            largest = list(zip(*(summaries(row, name, "max") for row in (pair.old, pair.new)), strict=False))
+            if largest and all(pair.is_by_rounding(*metrics) for metrics in largest):
+                judged = judge_series(old, new, math.inf, floor, exactly)
+        return OTHER_QUANTITY if judged[0] is Verdict.SAME and old.quantity != new.quantity else judged
+
+    def _row(self, pair: RowPair) -> Iterator[Finding]:
         """Findings, apart from metrics, by which the numbers are incomparable."""
+        old, new = pair.old, pair.new
         if old.finite and not new.finite:
-            yield Finding(key, "", Verdict.WORSE, "finite", "not finite", "a value is no longer finite")
-        work = [(row.steps, row.order, row.evaluations) for row in (old, new)]
-        if self.policy.flags != "ignore" and work[0] != work[1]:
-            method = [("different steps", old.steps, new.steps, _STEPS), ("different order", old.order, new.order, 1)]
-            if old.evaluations is not None:
-                method.insert(1, ("different evaluations of the field", old.evaluations, new.evaluations, _STEPS))
-            for reason, before, after, factor in method:
-                few, many = sorted(-1 if count is None else count for count in (before, after))
-                if few * factor < many:
-                    yield Finding(key, "", Verdict.INCOMPARABLE, str(before), str(after), reason)
-        fewer = _STEPS if kind_of(old, self.kinds).samples_are_steps else 1
-        samples = _samples(new)
-        if samples < -(-_samples(old) // fewer):
-            reason = "fewer samples, so their maximum is smaller"
-            yield Finding(key, "", Verdict.INCOMPARABLE, f"{_samples(old)} samples", f"{samples} samples", reason)
+            yield Finding(pair.key, "", Verdict.WORSE, "finite", "not finite", "a value is no longer finite")
+        counts = (
+            ("different steps", old.steps, new.steps, _STEPS),
+            ("different evaluations of the field", old.evaluations, new.evaluations, _STEPS),
+            ("different order", old.order, new.order, 1),
+        )
+        for reason, before, after, factor in counts if self.policy.flags != "ignore" else ():
+            if before == after or (before is None and factor == _STEPS):
+                continue
+            few, many = sorted(-1 if count is None else count for count in (before, after))
+            if few * factor < many:
+                yield Finding(pair.key, "", Verdict.INCOMPARABLE, str(before), str(after), reason)
+        samples, new_samples = _samples(old), _samples(new)
+        if new_samples < -(-samples // (_STEPS if pair.kind.samples_are_steps else 1)):
+            reason, fewer = "fewer samples, so their maximum is smaller", f"{new_samples} samples"
+            yield Finding(pair.key, "", Verdict.INCOMPARABLE, f"{samples} samples", fewer, reason)
         rounded = old.input_rounding
         if rounded is not None and new.input_rounding != rounded:
             eps = exact(2) ** (1 - old.bits)
             if new.input_rounding is None or exact(new.input_rounding) > max(exact(rounded), eps):
                 reason = "the data were rounded more"
-                yield Finding(key, "", Verdict.INCOMPARABLE, rounded, new.input_rounding, reason)
+                yield Finding(pair.key, "", Verdict.INCOMPARABLE, rounded, new.input_rounding, reason)
 
-    def _seconds(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
-        """The finding about the fastest of several runs, as other work only adds seconds; a single run says nothing.
+    def _seconds(self, pair: RowPair) -> Iterator[Finding]:
+        """Findings about the seconds of repeated runs, or of the fastest of several, as other work only adds seconds.
 
-        Not judged: compilation, which depends on caches, the reference, counts, and seconds that a program reports.
+        A rule for ``run`` applies to all of them.  Not judged: a single run, compilation, which depends on caches, the
+        reference, counts, and seconds that a program reports.
         """
-        comparable = "least" in old.seconds and "least" in new.seconds
-        if comparable and not self.limits(old, "seconds run").ignore:
-            spent = [max(row.seconds["least"], row.seconds.get(UNRESOLVED_SECONDS, 0.0)) for row in (old, new)]
-            verdict, why = judge_seconds(spent[0], spent[1], self.policy.timings)
-            before, after = (f"{seconds:.3g} s" for seconds in spent)
-            yield Finding(key, "run", verdict, before, after, why, "seconds")
-
-    def _repeated(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
-        """Findings about the seconds of repeated runs; a rule for ``run`` applies to all of them."""
-        limits = self.limits(old, "seconds run")
-        if not limits.ignore:
-            for name, judged in judge_repeated(old.seconds, new.seconds, self.policy.timings.ratio, limits.noise):
-                before, after = (f"{row.seconds[name]:.3g} s" if name in row.seconds else None for row in (old, new))
-                yield Finding(key, name, judged[0], before, after, judged[1], "seconds")
+        limits, timings = self.limits(pair.old, "seconds run"), self.policy.timings
+        old, new = pair.old.seconds, pair.new.seconds
+        judged: Iterable[tuple[str, Judged]] = ()
+        if self.repeated and BAND in old:
+            judged = judge_repeated(old, new, timings.ratio, limits.noise)
+        elif self.timed and "least" in old and "least" in new:
+            old, new = ({"run": max(part["least"], part.get(UNRESOLVED_SECONDS, 0.0))} for part in (old, new))
+            judged = [("run", judge_seconds(old["run"], new["run"], timings))]
+        for name, (verdict, why) in judged if not limits.ignore else ():
+            before, after = (f"{part[name]:.3g} s" if name in part else None for part in (old, new))
+            yield Finding(pair.key, name, verdict, before, after, why, "seconds")
 
     def _incomparable(self, old: Row, new: Row) -> str:
         """The reason why two rows are incomparable; empty where they are not."""
@@ -591,71 +636,19 @@ class RowComparison:
                 return f"the {which} is inconsistent: {problem}"
         return ""
 
-    def _eps(self, quantity: Quantity | None, row: Row) -> float:
-        """log10 of the eps of a row, or of the sum of its roundings."""
-        return (1 - row.bits) * BITS + kind_of(row, self.kinds).roundings(quantity, row.steps)
-
-    def _is_by_rounding(self, metric: Metric, match: Metric, old: Row) -> bool:
-        """Whether rounding alone explains both errors, in a row whose noise was not measured."""
-        if old.flags.get(NOISE) != NOT_MEASURED or None in (metric.log10, match.log10) or metric.kind != "error":
-            return False
-        kind = kind_of(old, self.kinds)
-        largest = max(size(metric), size(match))
-        return kind.noise_is_reruns(metric) and self._bound_of(old).explains(metric.quantity, largest)
-
-    def _is_truncation(self, metric: Metric, match: Metric, old: Row, new: Row) -> bool:
-        """Whether two errors differ by truncation: with the same steps, by more than rounding explains.
-
-        Without a requested step size and without reruns that measure rounding noise, equal evaluations show that the
-        steps are the same: they include the steps that step control rejects.
-        """
-        kind, subject = kind_of(old, self.kinds), old.key.subject
-        reruns = metric.band is not None and kind.noise_is_reruns(metric)
-        steps = subject.step or (old.steps and (old.evaluations or reruns))
-        if not steps or (old.steps, old.evaluations) != (new.steps, new.evaluations):
-            return False
-        if metric.kind != "error" or metric.log10 is None or match.log10 is None:
-            return False
-        if not (reruns or kind.assumed_band(subject)):
-            return False
-        low, high = sorted((metric.log10, match.log10))
-        return not self._bound_of(old).explains(metric.quantity, apart(low, high - low))
-
-    def _bound_of(self, row: Row) -> RoundingBound:
-        """The rounding bound of a row, cached for all of its metrics."""
-        if self._bound is None or self._bound.row is not row:
-            self._bound = RoundingBound(row, kind_of(row, self.kinds))
-        return self._bound
-
-    def _noise(self, metrics: dict[str, list[Metric]], row: Row, limits: Limits) -> float:
-        """Decades by which noise may move a series or a law: those of the metrics that summarize it."""
-        parts = (metrics.get(part, ()) for part in ("final", "rms", "max"))
-        bands = [of_starts(metric, row) for metric in chain.from_iterable(parts) if metric.band]
-        widest = max((allowed_loss(metric, metric) for metric in bands), default=0.0)
-        return limits.noise * max(widest, kind_of(row, self.kinds).assumed_band(row.key.subject))
-
-
-def _judge_support(old: Row, new: Row) -> tuple[Verdict, str] | None:
-    """The verdict where a row is unsupported in either report; None where the other was not measured."""
-    if old.outcome == new.outcome:
-        return Verdict.SAME, ""
-    if new.outcome == UNSUPPORTED:
-        return (Verdict.WORSE, "no longer supported") if old.outcome == "success" else None
-    return (Verdict.BETTER, "now supported") if new.outcome == "success" else None
-
 
 def _samples(row: Row) -> int:
     """The number of samples of a row; where it is not stated that of its longest series."""
     return row.samples or max((len(series.times) for series in row.series.values()), default=0)
 
 
-def _by_series(row: Row) -> dict[str, dict[str, list[Metric]]]:
-    """The metrics of a row by the series that they summarize, and by statistic."""
-    by_name: dict[str, dict[str, list[Metric]]] = {}
-    for metric in row.metrics.values():
-        if (quantity := metric.quantity) is not None:
-            by_name.setdefault(_series_key(quantity), {}).setdefault(quantity.statistic, []).append(metric)
-    return by_name
+def summaries(row: Row, series: str, *statistics: str) -> list[Metric]:
+    """The metrics of a row that are such statistics of a series."""
+    return [
+        metric
+        for metric in row.metrics.values()
+        if (quantity := metric.quantity) and quantity.statistic in statistics and _series_key(quantity) == series
+    ]
 
 
 @lru_cache(1 << 12)

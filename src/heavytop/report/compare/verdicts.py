@@ -9,6 +9,7 @@ from fractions import Fraction
 from functools import lru_cache
 
 from heavytop.errors import InputError
+from heavytop.measure.rounding_bound import RoundingBound
 from heavytop.measure.scalar import RESOLVED_RADII, UNRESOLVED
 from heavytop.precision import exact, log10
 from heavytop.records import (
@@ -29,7 +30,6 @@ from heavytop.report.compare.noise import (
     BITS,
     STEP_CONTROL,
     Limits,
-    RoundingBound,
     Timings,
     allowed_gain,
     allowed_loss,
@@ -298,15 +298,18 @@ def judge_outcomes(old: Row, new: Row, duration: float) -> Judged | None:
         return Verdict.INCOMPARABLE, f"{ended(old, 'baseline')}, {ended(new, 'candidate')}"
     if before == FAILED:
         return Verdict.SAME, "failed in both reports"
-    return _reached(old, new, duration)
-
-
-def _reached(old: Row, new: Row, duration: float) -> Judged | None:
-    """The verdict on two runs that stopped early in the same way, by the times reached."""
-    before, after = (abs(exact(row.time_reached)) for row in (old, new))
-    if after < before * (1 - exact(duration)):
+    if abs(exact(new.time_reached)) < abs(exact(old.time_reached)) * (1 - exact(duration)):
         return Verdict.WORSE, f"{ended(new, 'candidate')}, the baseline at {old.time_reached}"
     return None
+
+
+def judge_support(old: Row, new: Row) -> Judged | None:
+    """The verdict where a row is unsupported in either report; None where the other was not measured."""
+    if old.outcome == new.outcome:
+        return SAME
+    if new.outcome == UNSUPPORTED:
+        return (Verdict.WORSE, "no longer supported") if old.outcome == SUCCESS else None
+    return (Verdict.BETTER, "now supported") if new.outcome == SUCCESS else None
 
 
 # Whether the reference of a candidate is weaker than that of its baseline.
