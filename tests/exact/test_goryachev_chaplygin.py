@@ -29,28 +29,17 @@ def random_motion(seed):
     return motion_from(moment, (w1, w2, -4 * (w1 * g1 + w2 * g2) / g3), (g1, g2, g3), positive(rng))
 
 
-@pytest.mark.parametrize(
-    ("omega", "gamma"),
-    [
-        (("3/4", "1/2", 0), UP),
-        (("3/4", 0, 0), UP),  # y1 = y2 = 0: both at turning points
-        (("3/4", "1/1000000000000000000000000000000", 0), UP),
-        ((1, 0, 3), (0, 1, 0)),
-        ((1, 0, -3), (0, 1, 0)),
-        (("1/2", 0, "-1/2"), ("1/4", "1/3", 1)),
-    ],
-)
-def test_turning_points_are_starts_like_any_other(omega, gamma):
-    motion = motion_from((F(1), F(0)), omega, gamma)
-    assert_solves(motion, F(7, 3), F(-1000))
-
-
-@pytest.mark.parametrize("spin", [-3, -1, 2, F(3, 2)])
-def test_a_double_root_outside_the_gaps_does_no_harm(spin):
+ALONG_1 = (F(1), F(0))
+STARTS = {
+    "turning point": (ALONG_1, ("3/4", "1/2", 0), UP),
+    "both at turning points": (ALONG_1, ("3/4", 0, 0), UP),  # y1 = y2 = 0
+    "nearly so": (ALONG_1, ("3/4", F(1, 10**30), 0), UP),
+    "level, up": (ALONG_1, (1, 0, 3), (0, 1, 0)),
+    "level, down": (ALONG_1, (1, 0, -3), (0, 1, 0)),
+    "any": (ALONG_1, ("1/2", 0, "-1/2"), ("1/4", "1/3", 1)),
     # G = 0: u = 0 is a root of both factors
-    motion = motion_from((F(1), F(0)), (0, spin, 0), (F(4, 5), 0, F(3, 5)))
-    assert_solves(motion, F(11, 3))
-    assert_narrow(motion, F(10**9))
+    **{f"double root outside, {n}": (ALONG_1, (0, n, 0), (F(4, 5), 0, F(3, 5))) for n in (-3, -1, 2, F(3, 2))},
+}
 
 
 @pytest.mark.parametrize(
@@ -63,7 +52,7 @@ def test_a_double_root_outside_the_gaps_does_no_harm(spin):
     ],
 )
 def test_asymptotic_motions_and_a_variable_at_rest_are_motions_like_any_other(omega, gamma, resting):
-    motion = motion_from((F(1), F(0)), omega, gamma)
+    motion = motion_from(ALONG_1, omega, gamma)
     assert_every_digit(motion, F(7, 3), F(-40), F(10**6))
     for form in motion.made.values():
         assert resting is None or isinstance(form.line.variables[resting], Rest)
@@ -71,7 +60,7 @@ def test_asymptotic_motions_and_a_variable_at_rest_are_motions_like_any_other(om
 
 @pytest.mark.slow
 def test_a_thousand_digits_come_out():
-    assert_narrow(motion_from((F(1), F(0)), ("3/4", "1/2", 0), UP), F(10**6), 1000)
+    assert_narrow(motion_from(ALONG_1, ("3/4", "1/2", 0), UP), F(10**6), 1000)
 
 
 @pytest.mark.parametrize("power", [11, 20, 40, 120])
@@ -90,6 +79,6 @@ def test_levels_too_near_to_one_that_is_not_done_are_left_to_the_enclosure(power
 @pytest.mark.parametrize("exponent", [1, 2, 3])
 def test_near_a_degenerate_level_every_digit_comes_out(exponent):
     spin = F(1, 10**exponent)
-    motion = motion_from((F(1), F(0)), (0, F(1, 4), spin), (F(3, 5), -spin * F(4, 5), F(4, 5)))
+    motion = motion_from(ALONG_1, (0, F(1, 4), spin), (F(3, 5), -spin * F(4, 5), F(4, 5)))
     assert_solves(motion, F(7, 3))
     assert_narrow(motion, F(10**6))

@@ -48,38 +48,33 @@ def random_motion(seed):
     return motion_from(moment, triple(rng), triple(rng), positive(rng))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("omega", "gamma"),
-    [
-        ((F(1, 2), 0, 1), TILTED),  # q = 0: w1 infinite
-        ((0, 0, 1), TILTED),
-        ((F(1, 2), TINY, 1), TILTED),
-        ((F(1, 2), F(1, 3), 0), (F(3, 5), F(4, 5), 0)),  # r = γ3 = 0: both variables at turning points
-        ((F(1, 2), F(1, 3), TINY), (F(3, 5), F(4, 5), TINY)),
-        ((F(-1, 2), 0, 0), (F(3, 5), F(4, 5), 0)),  # both and q = 0
-        ((0, F(-1, 2), 0), (F(3, 5), 0, F(4, 5))),
-        ((0, 0, 0), TILTED),  # at rest: w1 infinite and w2 at a turning point
-    ],
-)
-def test_turning_points_are_starts_like_any_other(omega, gamma):
-    motion = motion_from((F(1), F(1, 3)), omega, gamma)
-    assert_solves(motion, F(7, 3), F(-1000))
-
-
-@pytest.mark.parametrize(
-    ("omega", "gamma"),
-    [
-        ((F(1, 2), F(1, 3), 5), UP),
-        ((2, F(1, 3), F(1, 2)), UP),
-        ((2, F(1, 3), F(1, 2)), tilted(200)),
-        ((F(-7, 6), -1, F(5, 3)), OTHER),
-    ],
-)
-def test_a_double_root_outside_the_gaps_does_no_harm_however_near(omega, gamma):
-    motion = motion_from((F(1), F(0)), omega, gamma)
-    assert_solves(motion, F(11, 3))
-    assert_narrow(motion, F(10**9))
+NEAR = {"outside": (2, F(1, 3), F(1, 2)), "asymptotic": (-1, F(1, 4), F(1, 4)), "both": (F(1, 2), F(1, 3), 1)}
+ALONG_1, LEVEL = (F(1), F(0)), (F(3, 5), F(4, 5), 0)
+STARTS = {
+    name: ((F(1), F(1, 3)), omega, gamma)
+    for name, (omega, gamma) in {
+        "q = 0": ((F(1, 2), 0, 1), TILTED),  # w1 infinite
+        "p = q = 0": ((0, 0, 1), TILTED),
+        "nearly q = 0": ((F(1, 2), TINY, 1), TILTED),
+        "r = γ3 = 0": ((F(1, 2), F(1, 3), 0), LEVEL),  # both variables at turning points
+        "nearly r = γ3 = 0": ((F(1, 2), F(1, 3), TINY), (F(3, 5), F(4, 5), TINY)),
+        "q = r = γ3 = 0": ((F(-1, 2), 0, 0), LEVEL),
+        "p = r = γ2 = 0": ((0, F(-1, 2), 0), (F(3, 5), 0, F(4, 5))),
+        "at rest": ((0, 0, 0), TILTED),  # w1 infinite and w2 at a turning point
+    }.items()
+} | {
+    name: (ALONG_1, omega, gamma)
+    for name, (omega, gamma) in {
+        "double root outside": ((F(1, 2), F(1, 3), 5), UP),
+        "another outside": ((2, F(1, 3), F(1, 2)), UP),
+        "nearly outside": ((2, F(1, 3), F(1, 2)), tilted(200)),
+        "outside, tilted": ((F(-7, 6), -1, F(5, 3)), OTHER),
+        "asymptotic": ((-1, F(1, 4), F(1, 4)), UP),
+        "asymptotic, tilted": ((F(1, 3), F(1, 6), 1), OTHER),
+        "asymptotic, third": ((-1, F(5, 6), F(-1, 3)), OTHER),
+        **{f"near a degenerate level, {name}, 1e-{n}": (NEAR[name], tilted(n)) for name in NEAR for n in (1, 3)},
+    }.items()
+}
 
 
 @pytest.mark.slow
@@ -100,22 +95,10 @@ def test_starts_of_few_small_numbers_are_solved_or_named(seed):
         assert any(word in refused for word in ("gamma != 0", "Delone", "degenerate"))
 
 
-NEAR = {"outside": (2, F(1, 3), F(1, 2)), "asymptotic": (-1, F(1, 4), F(1, 4)), "both": (F(1, 2), F(1, 3), 1)}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("level", NEAR)
-@pytest.mark.parametrize("exponent", [1, 3])
-def test_near_a_degenerate_level_every_digit_comes_out(level, exponent):
-    motion = motion_from((F(1), F(0)), NEAR[level], tilted(exponent))
-    assert_solves(motion, F(7, 3))
-    assert_narrow(motion, F(10**6))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("level", "exponent"), [("asymptotic", 8), ("both", 4), ("both", 7)])
 def test_nearer_theta_functions_take_over(level, exponent):
-    motion = motion_from((F(1), F(0)), NEAR[level], tilted(exponent))
+    motion = motion_from(ALONG_1, NEAR[level], tilted(exponent))
     assert_solves(motion, F(7, 3))
     assert any(isinstance(form, ThetaMotion) for form in motion.made.values())
     assert_overlap(motion.state(F(2), 100), Validated(motion.top, motion.start).state(F(2), 100))
@@ -124,9 +107,9 @@ def test_nearer_theta_functions_take_over(level, exponent):
 @pytest.mark.parametrize("level", ["asymptotic", "both"])
 def test_nearer_still_the_motion_is_refused_with_the_distance(level):
     with pytest.raises(NotInClass, match=r"to within .*e-12, the distance"):
-        motion_from((F(1), F(0)), NEAR[level], tilted(12))
+        motion_from(ALONG_1, NEAR[level], tilted(12))
     with pytest.raises(NotInClass, match=r"to within .*e-200, the distance"):
-        motion_from((F(1), F(0)), NEAR[level], tilted(200))
+        motion_from(ALONG_1, NEAR[level], tilted(200))
 
 
 @pytest.mark.slow
@@ -145,7 +128,7 @@ def test_theta_functions_and_abel_inversion_meet(seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("omega", [(0, 0, 0), (F(1, 2), 0, 1)])
 def test_theta_functions_and_abel_inversion_meet_where_q_vanishes(omega):
-    motion = motion_from((F(1), F(0)), omega, TILTED)
+    motion = motion_from(ALONG_1, omega, TILTED)
     with working_precision(320):
         theta = ThetaMotion.of(KovalevskayaLevel.of(motion.top, motion.start))
         for time in (F(0), F(7, 3)):
@@ -156,18 +139,8 @@ def test_theta_functions_and_abel_inversion_meet_where_q_vanishes(omega):
         assert all(a[n].overlaps(b[n]) for a, b in zip(rows, series, strict=True) for n in range(3))
 
 
-@pytest.mark.parametrize(
-    ("omega", "gamma"),
-    [((-1, F(1, 4), F(1, 4)), UP), ((F(1, 3), F(1, 6), 1), OTHER), ((-1, F(5, 6), F(-1, 3)), OTHER)],
-)
-def test_asymptotic_motions_are_motions_like_any_other(omega, gamma):
-    motion = motion_from((F(1), F(0)), omega, gamma)
-    assert_every_digit(motion, F(7, 3), F(-40), F(10**6))
-    assert_overlap(motion.state(F(5), 180), Validated(motion.top, motion.start).state(F(5), 180))
-
-
 def test_the_exponent_of_an_asymptotic_motion_is_that_of_its_enclosure():
-    motion = motion_from((F(1), F(0)), (-1, F(1, 4), F(1, 4)), UP)
+    motion = motion_from(ALONG_1, (-1, F(1, 4), F(1, 4)), UP)
     exponent, enclosure = float(motion.exponent(60)), Validated(motion.top, motion.start)
     logarithms = []
     for time in (F(8), F(24)):
@@ -194,7 +167,7 @@ def test_the_exponent_of_an_asymptotic_motion_is_that_of_its_enclosure():
     ],
 )
 def test_a_variable_may_rest_at_a_double_root(omega, gamma, resting):
-    motion = motion_from((F(1), F(0)), omega, gamma)
+    motion = motion_from(ALONG_1, omega, gamma)
     assert_every_digit(motion, F(7, 3), F(-40), F(10**6))
     for form in motion.made.values():
         assert isinstance(form.line.variables[resting], Rest)

@@ -74,19 +74,14 @@ def test_without_a_rotor_it_is_goryachev_and_chaplygins():
     assert [str(one) for one in plain.state(F(7, 3), 170)] == [str(one) for one in motion.state(F(7, 3), 170)]
 
 
-@pytest.mark.parametrize(
-    ("rotor", "omega", "gamma"),
-    [
-        (1, ("3/4", "1/2"), (0, 0, 1)),
-        (F(-5, 2), (F(1, 3), 0), (0, 0, 1)),  # q = γ2 = 0: both at turning points
-        (-2, (0, F(1, 2), 0), (1, 0, 0)),
-        (2, (1, 0, 3), (0, 1, 0)),
-        (3, (0, F(3, 2)), (F(4, 5), 0, F(3, 5))),
-    ],
-)
-def test_turning_points_are_starts_like_any_other(rotor, omega, gamma):
-    motion = motion_from((F(1), F(0)), rotor, tuple(map(F, omega)), gamma)
-    assert_solves(motion, F(7, 3), F(-1000))
+ALONG_1 = (F(1), F(0))
+STARTS = {
+    "turning point": (ALONG_1, 1, (F(3, 4), F(1, 2)), (0, 0, 1)),
+    "both at turning points": (ALONG_1, F(-5, 2), (F(1, 3), F(0)), (0, 0, 1)),  # q = γ2 = 0
+    "γ along the centre": (ALONG_1, -2, (0, F(1, 2), 0), (1, 0, 0)),
+    "level": (ALONG_1, 2, (1, 0, 3), (0, 1, 0)),
+    "tilted": (ALONG_1, 3, (0, F(3, 2)), (F(4, 5), 0, F(3, 5))),
+}
 
 
 @pytest.mark.slow

@@ -38,11 +38,10 @@ def turning(second, ratio, rate):
     return HeavyTop((1, second, third), 1, (1, 0, 0)), State((p, 0, r), (up, 0, side))
 
 
-@pytest.mark.parametrize("data", [(F(1, 5), F(1, 3), F(2)), (F(2, 3), F(1, 2), F(-1)), (F(3, 10), F(2, 3), F(1, 2))])
-def test_turning_points_are_starts_like_any_other(data):
-    top, start = turning(*data)
-    motion = Steklov(top, start)
-    assert_solves(motion, F(7, 3), F(-1000))
+STARTS = {
+    f"turning point {n}": Steklov(*turning(F(second), F(ratio), F(rate)))
+    for n, (second, ratio, rate) in enumerate((("1/5", "1/3", 2), ("2/3", "1/2", -1), ("3/10", "2/3", "1/2")))
+}
 
 
 @pytest.mark.parametrize("distance", [F(1, 10), F(1, 1000)])
