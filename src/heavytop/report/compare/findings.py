@@ -66,6 +66,10 @@ _COMPONENTS = {
 }
 
 
+_Curve = tuple[str, str, str]
+_Pair = tuple[float, float]
+
+
 class Change(NamedTuple):
     """A row that changed.  old, new: None where a report does not have it.
 
@@ -99,15 +103,21 @@ class Change(NamedTuple):
 
     def decades(self, name: str) -> float | None:
         """Decades by which the error of that name grew; None for other metrics, and where either is not a number."""
-        old, new = (self.metric(row, name) for row in (self.old, self.new))
+        old, new = self.metrics(name)
         if old is None or new is None or old.log10 is None or new.log10 is None or old.kind != "error":
             return None
         return new.log10 - old.log10
 
-    @staticmethod
-    def metric(row: Row | None, name: str) -> Metric | None:
-        """The metric of that name; None where the row or the metric is missing."""
-        return None if row is None else row.metrics.get(name)
+    def metrics(self, name: str) -> tuple[Metric | None, Metric | None]:
+        """The metric of that name in both rows; None where the row or the metric is missing."""
+        old, new = (None if row is None else row.metrics.get(name) for row in (self.old, self.new))
+        return old, new
+
+    @property
+    def growth_of_steps(self) -> float:
+        """log10 of the growth of the steps; nan where either report has none."""
+        old, new = (0 if row is None else row.steps for row in (self.old, self.new))
+        return math.log10(new / old) if old and new else math.nan
 
     @property
     def largest_loss(self) -> float:
@@ -130,23 +140,17 @@ class Change(NamedTuple):
         return None
 
 
-class SettingPoint(NamedTuple):
-    """One setting of an integrator on one case: log10 of its steps and of its error, in both reports."""
-
-    steps: tuple[float, float]
-    errors: tuple[float, float]
-
-
 @dataclass(slots=True)
 class Changes:
     """The changes between two reports, collected row by row.
 
+    points: log10 of the steps of a setting in both reports, and of its errors, by work-precision curve.
     yardstick: changes of heyoka where the baseline measures it beside a third-party integrator: no verdict on the
     latter.
     """
 
     rows: list[Change] = field(default_factory=list)
-    points: dict[tuple[str, str, str], list[SettingPoint]] = field(default_factory=dict)
+    points: dict[_Curve, list[tuple[_Pair, _Pair]]] = field(default_factory=dict)
     yardstick: list[Change] = field(default_factory=list)
     _third_party: bool = False
 
@@ -160,18 +164,12 @@ class Changes:
             changed.sort(key=lambda finding: RANK.index(finding.verdict))
             before, after = (old, new) if len(self.rows) < _MOST_HELD else (None, None)
             self.rows.append(Change(changed[0].row, _without_samples(before), _without_samples(after), changed))
-        if old is not None and new is not None:
-            self._point(old, new)
+        if old is not None and new is not None and old.steps and new.steps:
+            errors = [metric.log10 for row in (old, new) if (metric := row.metrics.get(_ERROR)) is not None]
+            if len(errors) == 2 and errors[0] is not None and errors[1] is not None:
+                point = (math.log10(old.steps), math.log10(new.steps)), (errors[0], errors[1])
+                self.points.setdefault(_curve(old.identity), []).append(point)
         return findings
-
-    def _point(self, old: Row, new: Row) -> None:
-        before, after = old.metrics.get(_ERROR), new.metrics.get(_ERROR)
-        if before is None or after is None or before.log10 is None or after.log10 is None:
-            return
-        if old.steps and new.steps:
-            steps = math.log10(old.steps), math.log10(new.steps)
-            key = _curve(old.identity)
-            self.points.setdefault(key, []).append(SettingPoint(steps, (before.log10, after.log10)))
 
     def excused(self) -> Callable[[Finding], bool]:
         """Removes excused findings from the rows, and returns the test for them.
@@ -193,9 +191,7 @@ class Changes:
         def is_yardstick(finding: Finding) -> bool:
             return self._third_party and finding.of_yardstick
 
-        rows = (
-            c._replace(findings=[finding for finding in c.findings if not is_compensated(finding)]) for c in self.rows
-        )
+        rows = (c._replace(findings=[f for f in c.findings if not is_compensated(f)]) for c in self.rows)
         verdicts = [change for change in rows if change.findings]
         self.yardstick = [change for change in verdicts if is_yardstick(change.findings[0])]
         self.rows = [change for change in verdicts if not is_yardstick(change.findings[0])]
@@ -208,17 +204,12 @@ class Changes:
         Such a new error decreases more slowly than the error of the method, which hides it at coarser settings.
         """
         curve = _curve(change.identity)
-        points, changed = (
-            self.points.get(curve, []),
-            [change for change in self.rows if _curve(change.identity) == curve],
-        )
-        if len(points) < 2 or not all(
-            change.old and change.old.steps and change.new and change.new.steps for change in changed
-        ):
+        points, changed = self.points.get(curve, []), [c for c in self.rows if _curve(c.identity) == curve]
+        if len(points) < 2 or not all(abs(change.growth_of_steps) <= _STEPS_MOVED for change in changed):
             return ""
-        finest = max(point.steps[0] for point in points)
+        finest = max(steps for (steps, _), _ in points)
         losses = {math.log10(change.old.steps): change.largest_loss for change in changed if change.old}
-        if finest not in losses or any(abs(_steps(change)) > _STEPS_MOVED for change in changed):
+        if finest not in losses:
             return ""
         largest = losses.pop(finest)
         if any(loss > _LESS * largest for loss in losses.values()):
@@ -356,7 +347,7 @@ def _digits(row: Row | None) -> float | None:
     return None if error is None or error.log10 is None else -error.log10
 
 
-def _curve(row: Identity) -> tuple[str, str, str]:
+def _curve(row: Identity) -> _Curve:
     """Case, integrator and format, which identify one work-precision curve."""
     return row.case, row.key.subject.name, row.key.precision
 
@@ -399,8 +390,7 @@ _SHOW_ORDER = {OBSERVED_ORDER: "single steps", ORDER_OF_RUNS: "whole runs"}
 def _orders_of_steps(changes: Changes) -> Iterator[tuple[str, float, Sentence]]:
     """Integrator, change and sentence for orders observed in single steps or whole runs."""
     for change, (order, shown_by) in product(changes.rows, _SHOW_ORDER.items()):
-        metrics = [change.metric(row, order.text) for row in (change.old, change.new)]
-        before, after = (math.nan if metric is None else float(metric) for metric in metrics)
+        before, after = (math.nan if m is None else float(m) for m in change.metrics(order.text))
         if abs(after - before) > 0:
             text = f"Order observed {before:g} → {after:g} in {shown_by} on {_where(change.identity, at=False)}."
             yield change.identity.key.subject.name, after - before, Sentence(text, frozenset({change.identity}))
@@ -408,20 +398,20 @@ def _orders_of_steps(changes: Changes) -> Iterator[tuple[str, float, Sentence]]:
 
 def _orders_of_settings(changes: Changes) -> Iterator[tuple[str, float, Sentence]]:
     """Integrator, change and sentence for −Δ log error/Δ log steps between one setting and the next finer one."""
-    changed: dict[tuple[str, str, str], set[Identity]] = {}
+    changed: dict[_Curve, set[Identity]] = {}
     for row in (change.identity for change in changes.rows):
         changed.setdefault(_curve(row), set()).add(row)
     for key, rows in changed.items():
         _, name, precision = key
-        for coarse, fine in pairwise(sorted(changes.points.get(key, []))):
-            spans = [b - a for a, b in zip(coarse.steps, fine.steps, strict=True)]
+        for (steps, errors), (more_steps, new_errors) in pairwise(sorted(changes.points.get(key, []))):
+            spans = [b - a for a, b in zip(steps, more_steps, strict=True)]
             if min(spans) > 0:
-                falls = [a - b for a, b in zip(coarse.errors, fine.errors, strict=True)]
+                falls = [a - b for a, b in zip(errors, new_errors, strict=True)]
                 before, after = (fall / span for fall, span in zip(falls, spans, strict=True))
                 if abs(after - before) >= _ORDER_MOVED:
-                    steps = " to ".join(f"{10 ** steps_range.steps[0]:.0f}" for steps_range in (coarse, fine))
                     first = next(iter(rows))
-                    where = f"{_case(first)} from {steps} steps ({clip(first.program, 40)}, {precision})"
+                    span = f"{10 ** steps[0]:.0f} to {10 ** more_steps[0]:.0f} steps"
+                    where = f"{_case(first)} from {span} ({clip(first.program, 40)}, {precision})"
                     text = f"Order observed {max(before, 0):z.1f} → {max(after, 0):z.1f} on {where}."
                     yield name, after - before, Sentence(text, frozenset(rows))
 
@@ -503,21 +493,12 @@ def _digits_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Se
 
 def _steps_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:
     """Changes of steps at the same setting: the largest of each integrator."""
-    moved = [c for c in rows if c.old is not None and c.new is not None and c.old.steps and c.new.steps]
-    moved = [c for c in moved if abs(_steps(c)) > _STEPS_MOVED]
+    moved = [change for change in rows if abs(change.growth_of_steps) > _STEPS_MOVED]
     for changes in _by_integrator(moved):
-        largest = max(changes, key=lambda change: abs(_steps(change)))
-        assert largest.old is not None
-        assert largest.new is not None
-        text = f"Steps {largest.old.steps} → {largest.new.steps} at the same setting on {_where(largest.identity)}."
+        largest = max(changes, key=lambda change: abs(change.growth_of_steps))
+        steps = " → ".join(str(row.steps) for row in (largest.old, largest.new) if row)
+        text = f"Steps {steps} at the same setting on {_where(largest.identity)}."
         yield Sentence(text, frozenset(change.identity for change in changes))
-
-
-def _steps(change: Change) -> float:
-    """log10 of the growth of the steps."""
-    assert change.old is not None
-    assert change.new is not None
-    return math.log10(change.new.steps / change.old.steps)
 
 
 def _ends_as_before(change: Change) -> bool:
@@ -532,28 +513,26 @@ def _ends_as_before(change: Change) -> bool:
 
 def _laws_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:
     """Growth laws that changed: one sentence for each quantity and integrator, with the first motion."""
-    rows_of: dict[tuple[str, str, str], list[Change]] = {}
+    rows_of: dict[tuple[str, str], list[Change]] = {}
     for change in rows:
         for finding in change.findings:
-            laws = [None if row is None else row.laws.get(finding.name) for row in (change.old, change.new)]
-            if finding.of == "growth" and finding.verdict in verdicts and None not in laws:
-                old, new = (law for law in laws if law is not None)
-                moved = _law_moved(old, new, finding.reason)
-                rows_of.setdefault(
-                    (change.identity.key.subject.name, _quantity(old.quantity, finding.name), moved), []
-                ).append(change)
-    for (_, what, moved), changes in rows_of.items():
+            laws = [law for row in (change.old, change.new) if row and (law := row.laws.get(finding.name))]
+            if finding.of == "growth" and finding.verdict in verdicts and len(laws) == 2:
+                moved = f"{_quantity(laws[0].quantity, finding.name)} {_law_moved(laws, finding.reason)}"
+                rows_of.setdefault((change.identity.key.subject.name, moved), []).append(change)
+    for (_, moved), changes in rows_of.items():
         also = f" and {plural(len(changes) - 1, 'other row')}" if len(changes) > 1 else ""
-        text = f"The {what} {moved} on {_where(changes[0].identity, at=False)}{also}."
+        text = f"The {moved} on {_where(changes[0].identity, at=False)}{also}."
         yield Sentence(text, frozenset(change.identity for change in changes))
 
 
-def _law_moved(old: Law, new: Law, reason: str) -> str:
+def _law_moved(laws: Sequence[Law], reason: str) -> str:
     """``grows like t (was t^0.5)``; within a class the exponents and the reason."""
-    if old.growth != new.growth:
-        return f"grows {_GROWS.get(new.growth, f'like {new.growth}')} (was {_GROWS.get(old.growth, old.growth)})"
-    exponents = [f"{law.exponent:.3g}" for law in (old, new) if law.exponent is not None]
-    return f"grows with exponent {' → '.join(exponents) or '?'}: {reason}"
+    old, new = (law.growth for law in laws)
+    if old != new:
+        return f"grows {_GROWS.get(new, f'like {new}')} (was {_GROWS.get(old, old)})"
+    exponents = " → ".join(f"{law.exponent:.3g}" for law in laws if law.exponent is not None)
+    return f"grows with exponent {exponents or '?'}: {reason}"
 
 
 def _quantity(quantity: Quantity | None, name: str) -> str:

@@ -14,6 +14,8 @@ import math
 import re
 import tomllib
 from fnmatch import translate
+from fractions import Fraction
+from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
@@ -171,31 +173,29 @@ def adjusted(policy: Policy, floor: str | None = None, loss_bits: str | None = N
 
 
 def _limits(rule: Rule, policy: Policy) -> Limits:
-    def number(name: str) -> float:
-        of_rule = getattr(rule, name)
-        return float(exact(getattr(policy, name) if of_rule is None else of_rule))
+    def number(name: str) -> Fraction:
+        return exact(getattr(policy if getattr(rule, name) is None else rule, name))
 
-    digits, bits = rule.loss_digits, rule.loss_bits
-    if digits is None and bits is None:
-        digits, bits = policy.loss_digits, policy.loss_bits
-    if digits is not None:
-        loss = truncation = float(exact(digits))
-    elif bits is not None:
-        loss = truncation = float(exact(bits)) * BITS
+    losses = policy if rule.loss_digits is None and rule.loss_bits is None else rule
+    if losses.loss_digits is not None:
+        loss = truncation = float(exact(losses.loss_digits))
+    elif losses.loss_bits is not None:
+        loss = truncation = float(exact(losses.loss_bits)) * BITS
     else:
         loss, truncation = _LOSS, _TENTH
-    floor = log10(exact(policy.floor if rule.floor is None else rule.floor))
-    limit = None if rule.limit is None else log10(exact(rule.limit))
-    return Limits(
-        -math.inf if floor is None else floor,
-        loss,
-        truncation,
-        number("noise"),
-        number("duration"),
-        number("value"),
-        -math.inf if rule.limit is not None and limit is None else limit,
-        rule.ignore,
-    )
+    noise, duration, value = (float(number(name)) for name in ("noise", "duration", "value"))
+    limit = None if rule.limit is None else log_of(rule.limit)
+    return Limits(log_of(number("floor")), loss, truncation, noise, duration, value, limit, rule.ignore)
+
+
+@lru_cache(1 << 12)
+def log_of(number: str | float | Fraction | None) -> float:
+    """log10 |number|, 0 for None, -inf for 0; nan for text that is not a number, which is within no bound."""
+    try:
+        size = 0.0 if number is None else log10(exact(number))
+    except InputError:
+        return math.nan
+    return -math.inf if size is None else size
 
 
 def _not_negative(name: str, value: str | float) -> None:

@@ -40,6 +40,7 @@ from heavytop.report.compare.noise import (
     Policy,
     allowed_loss,
     apart,
+    log_of,
     noisier,
     of_starts,
     reaches_further,
@@ -58,7 +59,6 @@ from heavytop.report.compare.verdicts import (
     judge_repeated,
     judge_seconds,
     judge_support,
-    log_of,
     size,
     weaker,
 )
@@ -109,26 +109,21 @@ def judge_law(old: Law, new: Law, noise: float = 0.0, rerun: bool = False) -> Ju
     if old == new:
         return SAME
     if old.growth != new.growth:
-        if "unresolved" not in (old.growth, new.growth) and not (rerun and _between_classes(old, new)):
+        powers = [law.exponent for law in (old, new) if law.exponent is not None and law.growth != "exponential"]
+        between_classes = rerun and len(powers) == 2 and abs(powers[1] - powers[0]) <= BENT
+        if "unresolved" not in (old.growth, new.growth) and not between_classes:
             worse = _GROWTH.index(new.growth) > _GROWTH.index(old.growth)
             return (Verdict.WORSE if worse else Verdict.BETTER), f"grows like {new.growth} (was {old.growth})"
-        if "exponential" in (old.growth, new.growth) or None in (old.exponent, new.exponent):
+        if len(powers) < 2:
             return Verdict.INCOMPARABLE, "the growth is resolved in one report only"
     if new.starts < old.starts:
         return Verdict.INCOMPARABLE, f"{old.starts} → {new.starts} starts"
-    for judged in (_judge_exponents(old, new, rerun), _judge_bends(old, new, rerun)):
-        if judged[0] is not Verdict.SAME:
-            break
+    judged = _judge_exponents(old, new, rerun)
+    if judged[0] is Verdict.SAME:
+        judged = _judge_bends(old, new, rerun)
     if judged[0] in (Verdict.WORSE, Verdict.INCOMPARABLE):
         return judged
     return _judge_information(old, new, noise) or judged
-
-
-def _between_classes(old: Law, new: Law) -> bool:
-    """Whether the exponents of two laws are so near that each law might belong to the class of the other."""
-    if "exponential" in (old.growth, new.growth) or old.exponent is None or new.exponent is None:
-        return False
-    return abs(new.exponent - old.exponent) <= BENT
 
 
 def _judge_exponents(old: Law, new: Law, rerun: bool) -> Judged:

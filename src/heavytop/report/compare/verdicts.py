@@ -6,12 +6,10 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import Enum
 from fractions import Fraction
-from functools import lru_cache
 
-from heavytop.errors import InputError
 from heavytop.measure.rounding_bound import RoundingBound
 from heavytop.measure.scalar import RESOLVED_RADII, UNRESOLVED
-from heavytop.precision import exact, log10
+from heavytop.precision import exact
 from heavytop.records import (
     CONTRADICTION,
     FAILED,
@@ -34,6 +32,7 @@ from heavytop.report.compare.noise import (
     allowed_gain,
     allowed_loss,
     apart,
+    log_of,
 )
 
 _ROUNDED = 2e-6
@@ -348,22 +347,17 @@ def weaker(old: Against, new: Against) -> str:
 
 
 def _certified_less(old: Sequence[Certified], new: Sequence[Certified]) -> str:
-    digits, after = (
-        [math.inf if certificate.digits is None else certificate.digits for certificate in part] for part in (old, new)
-    )
-    if not _all_enough(digits, after, lambda before, after: after >= _DIGITS_KEPT * before):
+    digits, fewer = ([math.inf if part.digits is None else part.digits for part in parts] for parts in (old, new))
+    if not _all_enough(digits, fewer, lambda before, after: after >= _DIGITS_KEPT * before):
         stated, lacking = (
-            " and ".join("all" if math.isinf(digits) else str(digits) for digits in part) or "no"
-            for part in (digits, after)
+            " and ".join("all" if math.isinf(count) else str(count) for count in part) or "no"
+            for part in (digits, fewer)
         )
         return f"the reference is certified to {lacking} digits (was {stated})"
-    starts = [
-        next((certificate.starts for certificate in part if certificate.starts is not None), None)
-        for part in (old, new)
-    ]
-    if starts[0] is not None and (starts[1] or 0) < _TIME_KEPT * starts[0]:
-        return f"the reference is certified for {starts[1] or 'no'} starts (was {starts[0]})"
-    times, earlier = ([log_of(certificate.time) for certificate in part] for part in (old, new))
+    starts, lost = (next((part.starts for part in parts if part.starts is not None), None) for parts in (old, new))
+    if starts is not None and (lost or 0) < _TIME_KEPT * starts:
+        return f"the reference is certified for {lost or 'no'} starts (was {starts})"
+    times, earlier = ([log_of(part.time) for part in parts] for parts in (old, new))
     if not _all_enough(times, earlier, lambda before, after: after >= before + math.log10(_TIME_KEPT)):
         return "the reference is certified at an earlier time"
     return ""
@@ -373,16 +367,6 @@ def _reference_name(reference: Against) -> str:
     return {"none": "first integrals alone", "equations": reference.method}.get(
         reference.how, f"a {reference.how} reference"
     )
-
-
-@lru_cache(1 << 12)
-def log_of(text: str | None) -> float:
-    """log10 |number|, 0 for None, -inf for 0; nan for text that is not a number, which is within no bound."""
-    try:
-        size = 0.0 if text is None else log10(exact(text))
-    except InputError:
-        return math.nan
-    return -math.inf if size is None else size
 
 
 def _all_enough(old: Sequence[float], new: Sequence[float], enough: Callable[[float, float], bool]) -> bool:
