@@ -5,6 +5,7 @@ from decimal import Decimal
 from fractions import Fraction
 from random import Random
 
+import flint
 import gmpy2
 import numpy
 import pytest
@@ -199,6 +200,8 @@ def test_numbers_of_other_packages_are_exact_and_plain() -> None:
         (gmpy2.mpz(3), Fraction(3)),
         (gmpy2.mpq(1, 3), third),
         (gmpy2.mpfr("0.5"), Fraction(1, 2)),
+        (flint.fmpz(3), Fraction(3)),
+        (flint.fmpq(1, 3), third),
         (Fraction(gmpy2.mpz(1), gmpy2.mpz(3)), third),
         (Fraction(numpy.int64(1), numpy.int64(3)), third),
         (numpy.int8(-3), Fraction(-3)),

@@ -162,6 +162,8 @@ def exact(value: Any) -> Fraction:
     kind = type(value).__name__
     if kind == "mpfr":
         return _from_mpfr(value)
+    if kind == "fmpq":
+        return Fraction(int(value.p), int(value.q))
     if kind in ("real", "real128"):
         return _from_quad(value) if kind == "real128" else round_to(_from_text(str(value)), int(value.prec))
     if isinstance(value, Decimal) and value.is_finite() and abs(value.adjusted()) > _MAX_TEXT:

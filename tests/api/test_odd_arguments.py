@@ -206,6 +206,9 @@ def test_one_odd_component_is_answered_or_refused_in_words() -> None:
                 answered(function, arguments | {argument: value})
 
 
+MASKED = np.ma.masked_equal([0.1, 0.4, 0.9, 0.6, 0.0, 0.8], 0.4)
+
+
 @pytest.mark.parametrize(
     ("call", "cause"),
     [
@@ -233,6 +236,9 @@ def test_one_odd_component_is_answered_or_refused_in_words() -> None:
         (lambda: ht.propagate(TOP, START, [1], integrator="splitting:4", step_limit=3), "does not support step_limit"),
         (lambda: ht.propagate(TOP, (0, 0, 1), [1]), "start must be a State; got (0, 0, 1)"),
         (lambda: ht.propagate(TOP, START, "123"), "times must be a list; got '123'"),
+        (lambda: ht.propagate(TOP, START, MASKED[:2]), "A MaskedConstant is not a number"),
+        (lambda: ht.Integrator(TOP).propagate(MASKED, 1), "start must be a State or an array of numbers"),
+        (lambda: ht.Integrator(TOP).propagate(np.ma.array([MASKED] * 2), 1), "start must be a State or an array"),
         (lambda: ht.ensemble([TOP] * 2, [START] * 3, [1]), "equally many; got 2 and 3"),
         (lambda: ht.ensemble([], START, [1]), "equally many; got 0"),
         (lambda: ht.ensemble(TOP, START, [1], threads=0), "threads must be at least 1; got 0"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from itertools import product
@@ -82,6 +83,18 @@ def test_shapes_follow_what_was_asked() -> None:
     assert len(several.steps) == len(several.time_reached) == 3
     assert several.succeeded
     assert "3 motions: all reached every time" in str(several)
+    assert "1 motion: all reached every time" in str(prepared.propagate(rows[:1], 0.5))
+    path = str(prepared.propagate(ROW, numpy.arange(1, 31) / 10))
+    assert "\n  ... 20 more" in path
+    assert "\n  3.0 " in path
+
+
+@pytest.mark.parametrize("options", [{}, {"tolerance": 1e-9}, {"integrator": "multiword"}])
+def test_a_copy_for_another_process_gives_the_same_bits(options: dict[str, Any]) -> None:
+    prepared = ht.Integrator(TOP, **options)
+    copy = pickle.loads(pickle.dumps(prepared))
+    assert (copy.propagate(ROW, 2).states == prepared.propagate(ROW, 2).states).all()
+    assert copy.propagate(ROW, 2).steps == prepared.propagate(ROW, 2).steps
 
 
 def test_starts_of_any_kind_of_number_are_the_exact_numbers_they_are() -> None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from heavytop import arguments
 from heavytop.arguments import Number, Numbers
-from heavytop.display import Tabular, TitledTable
+from heavytop.display import LazyLines, Tabular, TitledTable, plural
 from heavytop.errors import InputError, meant, prefixed, quoted, refusal
 from heavytop.exact.bodies import Finder
 from heavytop.exact.catalogue import find
@@ -403,15 +403,11 @@ class Propagated(Tabular):
 
     def _table(self) -> TitledTable:
         flat = self.to_numpy().reshape(-1, 6)
-        several = isinstance(self.outcome, tuple)
         said = "all reached every time" if self.succeeded else "not all times were reached"
         times = numpy.atleast_1d(self.times)
-        lines = [(str(float(times[i % len(times)])), *map(str, row)) for i, row in enumerate(flat[:_SHOWN])]
-        title = f"{len(self.steps) if isinstance(self.steps, tuple) else 1} motion{'s' if several else ''}: {said}"
+        lines = LazyLines(len(flat), lambda i: (str(float(times[i % len(times)])), *map(str, flat[i])))
+        title = f"{plural(len(self.steps) if isinstance(self.steps, tuple) else 1, 'motion')}: {said}"
         return TitledTable(title, ("t", *NAMES), lines)
-
-
-_SHOWN = 20
 
 
 class Integrator:
@@ -452,6 +448,11 @@ class Integrator:
         )
         if self._is_plain:
             self._prepare()
+
+    def __reduce__(self) -> Any:
+        """The call that prepares it again, for another process."""
+        prepare = partial(Integrator, integrator=self._asked, system=self._system, **self._options)
+        return prepare, (self._top, self._form)
 
     def _prepare(self) -> None:
         options = {name: value for name, value in self._options.items() if name != "step_limit"}
@@ -503,6 +504,8 @@ class Integrator:
     def _rows(self, start: Any) -> tuple[Any, bool]:
         """The starts, a row each, and whether there are several."""
         try:
+            if numpy.ma.is_masked(start):
+                raise TypeError
             array = start if isinstance(start, numpy.ndarray) else _array(list(start))
             if array.dtype.kind == "f" and array.dtype.itemsize < 8:
                 array = array.astype(float)

@@ -377,6 +377,8 @@ def _as_doubles(times: Any) -> Any:
     floats = isinstance(times, list | tuple) and set(map(type, times)) == {float}
     if not floats and not (isinstance(times, numpy.ndarray) and times.dtype == numpy.float64 and times.ndim == 1):
         return None
+    if numpy.ma.is_masked(times):
+        return None
     doubles = numpy.array(times, dtype=numpy.float64)
     if not 0 < len(doubles) <= MOST_MEMBERS:
         return None
