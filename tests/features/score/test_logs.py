@@ -10,7 +10,7 @@ import pytest
 
 import heavytop as ht
 from heavytop.features.score.trajectories.columns import header
-from support.in_process import heavytop
+from support.in_process import heavytop, printed
 
 BODY = ht.Body("2", "9.81", ("0.3", "-0.2", "0.4"), ("1.2", "0.9", "0.6"), "centre of mass")
 HEAD = """# mass: 2
@@ -67,10 +67,13 @@ def exported(stamp: str, times: Sequence[str], attitude: str, rate: str) -> str:
     return HEAD + "\n".join([",".join([stamp, *names]), *map(",".join, zip(times, body, strict=True))])
 
 
-def mujoco(joint: str) -> str:
+def mujoco(joint: str, off: float = 1e-15) -> str:
+    """A free joint is held at the origin of the body, by a constraint that is off by so much."""
     shift = 3 if joint == "free" else 0
-    names = [f"qpos[{k + shift}]" for k in range(4)] + [f"qvel[{k + shift}]" for k in range(3)]
-    return HEAD + f"# joint: {joint}\n" + ",".join(["time", *names]) + "\n" + rows(TIMES, quaternions(), omegas())
+    names = [f"qpos[{k}]" for k in range(4 + shift)] + [f"qvel[{k + shift}]" for k in range(3)]
+    origin = numpy.full((len(TIMES), shift), off)
+    parts = TIMES, numpy.hstack([origin, quaternions()]), omegas()
+    return HEAD + f"# joint: {joint}\n" + ",".join(["time", *names]) + "\n" + rows(*parts)
 
 
 def tum(header: bool) -> str:
@@ -300,6 +303,7 @@ def test_stamps_in_double_say_how_many_digits_of_the_time_they_keep(tmp_path: Pa
         ("Time (s),Gyroscope x (rad/s),Gyroscope y (rad/s),Gyroscope z (rad/s)", "framed"),
         ("Elapsed Time,root_pos_w_x,root_pos_w_y,root_pos_w_z,root_lin_vel_w_x,root_lin_vel_w_y,root_lin_vel_w_z",
          "position"),
+        ("t,imu_w_x,imu_w_y,imu_w_z,v_w_x,v_w_y,v_w_z,goal_q_w,goal_q_x,goal_q_y,goal_q_z", "framed"),
         ("t,root_quat_w_w,root_quat_w_x,root_quat_w_y,root_quat_w_z,root_ang_vel_w_x,root_ang_vel_w_y,root_ang_vel_w_z",
          "quaternion omega_space"),
         ("t_sec,dcm_11,dcm_12,dcm_13,dcm_21,dcm_22,dcm_23,dcm_31,dcm_32,dcm_33", "matrix"),
@@ -394,6 +398,13 @@ def test_stamps_of_a_start_that_is_given_are_counted_from_it(tmp_path: Path) -> 
         assert json.loads(shown.stdout)["digits_right"] > 13
         assert ("counted from the first row" in shown.stderr) == (begin == 0)
         assert "nanosec" not in shown.stderr
+
+
+def test_a_joint_that_slips_is_in_no_other_unit_of_length(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(mujoco("free", 1e-5))
+    score = json.loads(printed("score", path, "--json"))
+    assert (score["diagnosis"], 4 < score["digits_right"] < 5.1) == ([], True)
 
 
 def test_rows_of_kitti_are_refused_with_the_line_that_names_them(tmp_path: Path) -> None:

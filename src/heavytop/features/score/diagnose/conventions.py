@@ -498,7 +498,7 @@ def _positions(samples: Observations) -> Iterator[Row]:
         ("displacement", {}, {"displaced": True}),
         ("position_reversed", {}, {"scale": -1.0}),
     ]
-    for name, factor in _LENGTHS.items():
+    for name, factor in _LENGTHS.items() if samples.point.any() else ():  # 0 has no unit
         rows += [("position_unit", {"factor": name}, {"scale": factor, "displaced": moved}) for moved in (False, True)]
     if samples.body.centre.any() and not numpy.array_equal(samples.point, samples.body.centre):
         rows.append(("position_of_centre", {}, {"of_point": tuple(samples.body.centre)}))

@@ -278,7 +278,8 @@ def ordered_places(
     extra = [name for name in components if name not in names]
     if missing or extra:
         fault = f"component {missing[0]} is missing" if missing else f"component {extra[0]} has no counterpart"
-        raise InputError(f"The columns of the {_words(quantity)} are incomplete: {fault}.", REMEDY)
+        remedy = "Give every component, or another name to a column of something else."
+        raise InputError(f"The columns of the {_words(quantity)} are incomplete: {fault}.", remedy)
     return [(name, components[name]) for name in names]
 
 
@@ -431,7 +432,7 @@ def columns(document: Mapping[str, Any], convention: Convention) -> ColumnTable:
     """
     table = _of_table(document, convention) if "header" in document else _of_lists(document, convention)
     if not table.values:
-        raise InputError("No column describes the motion.", _REMEDY)
+        raise InputError("No column describes the motion.", REMEDY)
     if "euler" in table.values and not convention.sequence:
         raise InputError("The Euler angles have no sequence.", 'Give sequence, such as "ZXZ" or "ZYX".')
     return table

@@ -96,7 +96,10 @@ def read_table(text: str, started: bool = False) -> tuple[dict[str, Any], list[s
     notes += noted
     if keys.get("attitude") == "rotation vector":
         names = [re.sub(r"^r_?([xyz])$", r"rotvec\1", name.strip()) for name in names]
-    meaning = observed_columns.header(names, str(keys.get("joint", "")))
+    joint = str(keys.get("joint", ""))
+    if joint == "free":  # qpos[0] to qpos[2] are where the origin of the body is
+        keys.setdefault("point", ["0", "0", "0"])
+    meaning = observed_columns.header(names, joint)
     logs.require_understood(names, meaning.others, [*meaning.places])
     cut, times = "", [] if meaning.time is None else [logs.number(row[meaning.time]) for row in cells]
     if times and None not in times:

@@ -38,7 +38,8 @@ _ALIASES = tuple(
         (r"ang_?vel_w_([xyz])", "omega_space_{}"),  # of Isaac: _w_ is the world
         (rf"(?:angular_?velocity|angular|angvel|ang_vel){_OF_BODY}[./_]([xyz])", "w{}"),
         (rf"gyr(?:o(?:scope)?)?{_OF_BODY}[./_ ]?([xyz])", "w{}"),
-        (rf"(?<!vel_)(?<!acc_)(?<!force_)(?<!torque_)w{_OF_BODY}[./_]?([xyz])", "w{}"),
+        # of v_w_x the w is the world
+        (rf"(?:(?:(?<!_)|(?<=imu_))w{_OF_BODY}[./_]?([xyz])|w([xyz]))", "w{}"),
         (r"(?:sim_?time|time_?s(?:ec(?:onds?)?)?|t_s(?:ec)?|seconds|elapsed(?:[_ ]?(?:s|secs?|seconds?|time))?)", "t"),
         (r"(?:timestamp|stamp|__time)", "timestamp"),
         (r"(?:receive|publish|log|record)_?time", "epoch"),
@@ -61,7 +62,9 @@ _GIVES = {
     "an attitude": ("quaternion", "matrix", "euler", "rodrigues", "rotation_vector", "gamma"),
     "an angular velocity": ("omega", "omega_space", "framed"),
 }
-_OTHER = re.compile(r"(?:.*[._])?(?:cov|err|std|sigma_(?!BN)|desired|target|cmd|ref|bias)|b_[wa]_", re.IGNORECASE)
+_OTHER = re.compile(
+    r"(?:.*[._])?(?:cov|err|std|sigma_(?!BN)|des_|desired|setpoint|goal|target|cmd|ref|bias)|b_[wa]_", re.IGNORECASE
+)
 _WITH_UNIT = re.compile(r"(.*?)\s*([\[(](?!\s*[wxyz]\s*[\])])\s*(?:[^\[\]()\d][^\[\]()]*)?[\])])?")
 """The name of a column, and its unit in brackets, which may be empty."""
 _OF_FOUR = re.compile(r"(.*[^\s])([wxyz])", re.IGNORECASE)
