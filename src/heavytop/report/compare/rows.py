@@ -501,7 +501,8 @@ class RowComparison:
         if noise > (old_banded.band or 0.0):
             old_banded = msgspec.structs.replace(old_banded, band=noise)
         allowed = msgspec.structs.replace(limits, loss=limits.truncation) if truncated else limits
-        judged = judge(old_banded, new_banded, allowed, pair.eps(metric.quantity), smallest, bound)
+        floor = limits.floor + pair.eps(metric.quantity)
+        judged = judge(old_banded, new_banded, allowed, (max(floor, smallest[0]), max(floor, smallest[1])), bound)
         changed = judged[0] in (Verdict.WORSE, Verdict.BETTER) and limits.noise and not beyond_limit(match, limits)
         if changed and pair.is_by_rounding(metric, match):
             return SAME

@@ -61,27 +61,20 @@ SAME: Judged = (Verdict.SAME, "")
 
 
 def judge(
-    old: Metric,
-    new: Metric,
-    limits: Limits,
-    eps: float,
-    least: tuple[float, float],
-    bound: RoundingBound | None = None,
+    old: Metric, new: Metric, limits: Limits, floors: tuple[float, float], bound: RoundingBound | None = None
 ) -> Judged:
     """The verdict on two values of one metric.
 
-    eps: log10 of the format's, or of the sum of its roundings.  least: log10 of the smallest size that counts for an
-    error, in each row.  bound: the largest error that rounding explains; None where the noise band alone decides.
+    floors: log10 of the size below which all errors are the same, in each row.  bound: the largest error that rounding
+    explains; None where the noise band alone decides.
     """
     if old.kind != new.kind:
         return Verdict.INCOMPARABLE, f"kind {old.kind} → {new.kind}"
-    if (judged := _not_numbers(old, new, limits)) is not None:
+    if judged := _not_numbers(old, new, limits) or beyond_limit(new, limits):
         return judged
     if old.kind == "error":
-        return _errors(old, new, limits, limits.floor + eps, least, bound)
-    if old.kind == "duration":
-        return _durations(old, new, limits, bound)
-    return _values(old, new, limits)
+        return _errors(old, new, limits, floors, bound)
+    return _durations(old, new, limits, bound) if old.kind == "duration" else _values(old, new, limits)
 
 
 def _not_numbers(old: Metric, new: Metric, limits: Limits) -> Judged | None:
@@ -106,20 +99,13 @@ def size(metric: Metric) -> float:
 
 
 def _errors(
-    old: Metric,
-    new: Metric,
-    limits: Limits,
-    floor: float,
-    least: tuple[float, float],
-    bound: RoundingBound | None,
+    old: Metric, new: Metric, limits: Limits, floors: tuple[float, float], bound: RoundingBound | None
 ) -> Judged:
     """Smaller is better; below the floor all errors are the same.  An unresolved error is at most its bound: never
     better, and incomparable where the bound itself would be worse, or is so much smaller that the error or the
     reference must be another one.
     """
-    a, b = max(size(old), floor, least[0]), max(size(new), floor, least[1])
-    if limited := beyond_limit(new, limits):
-        return limited
+    a, b = max(size(old), floors[0]), max(size(new), floors[1])
     noise = limits.noise * (allowed_loss(old, new) if b > a else allowed_gain(old, new))
     if noise > STEP_CONTROL and b - a > max(limits.loss, STEP_CONTROL) and bound is not None:
         noise = noise if bound.explains(old.quantity, apart(a, b - a)) else STEP_CONTROL
@@ -165,8 +151,6 @@ def beyond_limit(new: Metric, limits: Limits) -> Judged | None:
 
 def _durations(old: Metric, new: Metric, limits: Limits, bound: RoundingBound | None) -> Judged:
     """Longer is better; never is longest."""
-    if limited := beyond_limit(new, limits):
-        return limited
     if old.value == new.value:
         return SAME
     if old.value == "never":
@@ -176,9 +160,7 @@ def _durations(old: Metric, new: Metric, limits: Limits, bound: RoundingBound | 
     if old.log10 is None:
         return Verdict.BETTER, f"now at {new.value}"
     ratio = 10 ** min(size(new) - old.log10, 300.0)
-    shorter, longer = (
-        10 ** min(limits.noise * band, 300.0) for band in (allowed_loss(old, new), allowed_gain(old, new))
-    )
+    shorter, longer = (10 ** min(limits.noise * band(old, new), 300.0) for band in (allowed_loss, allowed_gain))
     by_noise = ratio * shorter >= 1 and (bound is None or bound.explains_times(old.value, 1 - ratio))
     if ratio < 1 - limits.duration and not by_noise:
         return Verdict.WORSE, f"{1 - ratio:.0%} earlier"
