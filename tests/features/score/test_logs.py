@@ -71,7 +71,7 @@ def mujoco(joint: str, off: float = 1e-15) -> str:
     """A free joint is held at the origin of the body, by a constraint that is off by so much."""
     shift = 3 if joint == "free" else 0
     names = [f"qpos[{k}]" for k in range(4 + shift)] + [f"qvel[{k + shift}]" for k in range(3)]
-    origin = numpy.full((len(TIMES), shift), off)
+    origin = off * numpy.sin(numpy.outer(TIMES, numpy.arange(1, shift + 1)))
     parts = TIMES, numpy.hstack([origin, quaternions()]), omegas()
     return HEAD + f"# joint: {joint}\n" + ",".join(["time", *names]) + "\n" + rows(*parts)
 
