@@ -86,6 +86,14 @@ def test_the_order_of_refined_settings_shows_where_it_falls(errors: tuple[str, .
     assert found(healthy, healthy)[0].startswith("Nothing changed")
 
 
+@pytest.mark.parametrize("counts", [(10, 100), (3625, 3655)])
+def test_rising_errors_and_nearly_equal_steps_show_no_order(counts: tuple[int, int]) -> None:
+    healthy, faulty = (
+        [work(n, size) for n, size in zip(counts, ("1e-9", end), strict=True)] for end in ("2e-9", "1e-7")
+    )
+    assert not any("Order observed" in said for said in found(healthy, faulty))
+
+
 def test_rows_of_two_versions_are_one_row_and_both_versions_are_said() -> None:
     plain = {"3.3": [work(10, "1e-4"), work(100, "1e-8")], "4.0": [work(10, "1e-4"), work(100, "1e-6")]}
     old, new = ([replace(row, key=row.key.of_version(v)) for row in rows] for v, rows in plain.items())

@@ -93,7 +93,7 @@ def compare(
 
     list_same: False to count unchanged metrics in place of listing them.
     folders: of both reports; rows of kinds with records of single motions are joined by motion.
-    Raises InputError where neither report has a row, or the policy leaves nothing to compare.
+    Raises InputError where no row is in the baseline, or the policy leaves nothing to compare.
     """
     findings_by_row: list[list[Finding]] = []
     missing: list[tuple[int, Row]] = []
@@ -126,7 +126,7 @@ def compare(
             findings_by_row.append(changes.add(None, row, [new]))
     excused = changes.excused()
     findings = [finding.as_same() if excused(finding) else finding for finding in chain.from_iterable(findings_by_row)]
-    if not findings and not rows.same:
+    if not rows.same and all(finding.verdict is Verdict.NEW for finding in findings):
         raise InputError("There is nothing to compare.", "Compare reports of `heavytop run` that have rows.")
     same = rows.same + sum(finding.verdict is Verdict.SAME for finding in findings)
     planned = "seed" in baseline.plan | candidate.plan  # a score has no plan

@@ -30,6 +30,8 @@ RANK = (Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING, Verdict.BETTER, Ve
 """The verdicts, the worst first."""
 _ORDER_MOVED = 0.5
 """Least reported change of an order between two settings: errors near rounding change it by as much."""
+_FINER = 0.05
+"""Decades: settings whose steps differ by less show no order, as errors vary by more between them."""
 _DIGITS_MOVED = 0.1
 """Least reported change of digits right, which are written with one decimal."""
 _ENDS_AS_BEFORE = 0.5
@@ -405,14 +407,14 @@ def _orders_of_settings(changes: Changes) -> Iterator[tuple[str, float, Sentence
         _, name, precision = key
         for (steps, errors), (more_steps, new_errors) in pairwise(sorted(changes.points.get(key, []))):
             spans = [b - a for a, b in zip(steps, more_steps, strict=True)]
-            if min(spans) > 0:
+            if min(spans) >= _FINER:
                 falls = [a - b for a, b in zip(errors, new_errors, strict=True)]
-                before, after = (fall / span for fall, span in zip(falls, spans, strict=True))
+                before, after = (max(fall / span, 0.0) for fall, span in zip(falls, spans, strict=True))
                 if abs(after - before) >= _ORDER_MOVED:
                     first = next(iter(rows))
                     span = f"{10 ** steps[0]:.0f} to {10 ** more_steps[0]:.0f} steps"
                     where = f"{_case(first)} from {span} ({clip(first.program, 40)}, {precision})"
-                    text = f"Order observed {max(before, 0):z.1f} → {max(after, 0):z.1f} on {where}."
+                    text = f"Order observed {before:z.1f} → {after:z.1f} on {where}."
                     yield name, after - before, Sentence(text, frozenset(rows))
 
 
