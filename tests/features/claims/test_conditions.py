@@ -1,16 +1,15 @@
 """A proof has conditions: what is undefined, not real, jumps or is not kept by the flow never holds, and is named."""
 
-import json
 from fractions import Fraction
-from pathlib import Path
 
 import pytest
 
 from heavytop.errors import InputError
 from heavytop.features.claims.algebra.conditions import written
 from heavytop.features.claims.algebra.prover import KEPT
+from heavytop.features.claims.text import audit_text
 from support.claim_tables import Table, audited, integral, open_conditions, top, upright
-from support.in_process import heavytop
+from support.helpers import shown
 
 FREE = top("2 3 5", "0 0 1", weight="0")
 
@@ -187,36 +186,22 @@ def test_what_is_0_at_the_samples_is_not_said_to_be_smaller():
     assert row.residual == "0 at the sample points"
 
 
-@pytest.mark.slow
-def test_the_witness_of_an_integral_has_no_time_and_its_text_no_equations_of_motion(tmp_path: Path) -> None:
-    claim = (
-        'name = "spin"\nkind = "integral"\n[top]\ninertia = ["2", "2", "5"]\nweight = "1"\ncentre = ["0", "0", "1"]\n'
-        '[integral]\nvalue = "Omega3"\n'
-    )
-    (path := tmp_path / "integral.toml").write_text(claim)
-    text = heavytop("audit", path).stdout
+def test_the_witness_of_an_integral_has_no_time_and_its_text_no_equations_of_motion() -> None:
+    right, wrong = (audited(integral(value, top("2 2 5", "0 0 1"))) for value in ("Omega3", "Omega1"))
+    text = shown(audit_text(right))
     assert "first integral" in text
     assert "proven to be constant along the motions of: heavy_top" in text
     assert "equations of motion" not in text
-    path.write_text(claim.replace("Omega3", "Omega1"))
-    document = json.loads(heavytop("audit", path, "--json").stdout)
-    assert document["verdict"] == "refuted"
-    assert "t" not in document["equations"][0]["witness"]
+    assert "t" not in wrong.to_json()["equations"][0]["witness"]
 
 
-@pytest.mark.slow
-def test_conditions_stand_in_the_text_and_in_the_json(tmp_path: Path) -> None:
-    (path := tmp_path / "jump.toml").write_text(
-        'name = "jump"\nkind = "motion"\n[top]\ninertia = ["2", "2", "3"]\nweight = "1"\ncentre = ["0", "0", "1"]\n'
-        '[motion]\nomega = ["0", "0", "sqrt(t^2)/t"]\ngamma = ["0", "0", "1"]\n'
-    )
-    run = heavytop("audit", path)
-    assert run.returncode == 3
-    assert "not discharged: t ≠ 0" in run.stdout
-    document = json.loads(heavytop("audit", path, "--json").stdout)
-    assert all(row["holds"] is None for row in document["equations"])
-    conditions = document["equations"][0]["conditions"]
-    assert {"text": "t ≠ 0", "discharged": False, "reason": "not shown"} in conditions
+def test_conditions_stand_in_the_text_and_in_the_json() -> None:
+    report = audited(upright("sqrt(t^2)/t"))
+    assert report.exit_code == 3
+    assert "not discharged: t ≠ 0" in shown(audit_text(report))
+    equations = report.to_json()["equations"]
+    assert all(row["holds"] is None for row in equations)
+    assert {"text": "t ≠ 0", "discharged": False, "reason": "not shown"} in equations[0]["conditions"]
 
 
 def loose(value: str = "Omega3*sqrt(a^3)", **parts) -> Table:

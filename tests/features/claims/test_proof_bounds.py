@@ -10,7 +10,6 @@ from heavytop.features.claims.algebra.conditions import (
     ConditionKind,
     Need,
     condition,
-    conditions_for_zero,
     conditions_of,
     is_exactly_zero,
     written,
@@ -402,21 +401,6 @@ def test_a_bounded_function_counts_with_its_bound(expression: sympy.Expr, expect
     value, strict = sign_by_structure(expression)
     assert value == expected[0]
     assert strict <= expected[1]
-
-
-@pytest.mark.parametrize(
-    ("expression", "zeros"),
-    [
-        (sympy.sqrt(T) - 2, {T - 4}),
-        (sympy.sqrt(T) + 2, {sympy.sqrt(T) + 2}),
-        (T**2 * A, {A * T}),
-        ((1 + T**2) * A, {A}),
-        (sympy.exp(A) - 2, {sympy.exp(A) - 2}),
-        (sympy.exp(A) - 1, {A}),
-    ],
-)
-def test_simpler_conditions_hold_at_the_same_points(expression: sympy.Expr, zeros: set[sympy.Expr]) -> None:
-    assert set(conditions_for_zero(expression)) == zeros
 
 
 def test_a_place_is_one_only_where_the_relations_are_proven_to_be_0() -> None:
