@@ -1,4 +1,4 @@
-"""am, Legendre's integrals, theta functions, ζ and σ in claims: values, derivatives, conditions."""
+"""Jacobi's functions, am, Legendre's integrals, theta functions, ζ and σ in claims: values, derivatives, identities."""
 
 from fractions import Fraction
 
@@ -6,6 +6,7 @@ import mpmath
 import pytest
 import sympy
 
+from heavytop.errors import InputError
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.reader import parse, symbol
@@ -37,6 +38,11 @@ def of_theta(index: int, m: str, real: str, imaginary: str = "0") -> mpmath.mpc:
         ("ellipticF(5*u, 1/3)", lambda u: mpmath.ellipf(5 * u, mpmath.mpf(1) / 3)),
         ("ellipticE(-7*u, 3/4)", lambda u: mpmath.ellipe(-7 * u, 0.75)),
         ("ellipticPi(1/4, 7*u, -2)", lambda u: mpmath.ellippi(0.25, 7 * u, -2)),
+        *(
+            (f"{name}({k}*u, {m})", lambda u, name=name, k=k, m=m: mpmath.ellipfun(name, k * u, m=mpmath.mpmathify(m)))
+            for name in ("sn", "cn", "dn")
+            for k, m in ((1, "0"), (-2, "1/3"), (32, "99/100"), (0, "1/3"), (3, "1"))
+        ),
         ("sin(am(9*u, 1/4))", lambda u: mpmath.ellipfun("sn", 9 * u, m=0.25)),
         *((f"theta{i}(u, 1/7)", lambda u, i=i: mpmath.jtheta(i, u, mpmath.mpf(1) / 7)) for i in (1, 2, 3, 4)),
         ("Eta(u, 3/4)", lambda u: of_theta(1, "0.75", u).real),
@@ -62,6 +68,10 @@ def weierstrass(u: mpmath.mpf) -> mpmath.mpf:
 
 
 RATES = [
+    ("sn(u, m)", "cn(u, m)*dn(u, m)"),
+    ("cn(u, m)", "-sn(u, m)*dn(u, m)"),
+    ("dn(u, m)", "-m*sn(u, m)*cn(u, m)"),
+    ("cn(u, m)*dn(u, m)", "2*m*sn(u, m)^3 - (1 + m)*sn(u, m)"),
     ("am(u, m)", "dn(u, m)"),
     ("ellipticF(am(2*u, m), m)", "2"),
     ("ellipticE(am(u, m), m)", "1 - m*sin(am(u, m))^2"),
@@ -128,6 +138,16 @@ def test_degenerate_parameters_and_poles_are_conditions(
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
+        ("sn(t, a)^2 + cn(t, a)^2 - 1", "holds"),
+        ("dn(t, a)^2 + a*sn(t, a)^2 - 1", "holds"),
+        ("sqrt(1 - a*sn(t, a)^2) - dn(t, a)", "holds"),
+        ("sn(-t, a) + sn(t, a) + cn(-t, a) - cn(t, a)", "holds"),
+        ("cn(t, 1/2)/cn(1, 1/2)*cn(1, 1/2) - cn(t, 1/2)*dn(t, a)/dn(t, a)", "holds"),  # divisors that are never 0
+        ("sqrt(1 - sn(t, a)^2) - cn(t, a)", "refuted"),
+        ("dn(t, a)^2 + sn(t, a)^2 - 1", "refuted"),
+        ("sn(2*t, a) - 2*sn(t, a)*cn(t, a)*dn(t, a)", "refuted"),
+        ("sn(t, a) - sn(t, 1 - a^2)", "refuted"),
+        ("dn(t, a) - dn(t + 1, a)", "refuted"),
         ("ellipticPi(0, t, a) - ellipticF(t, a)", "holds"),
         ("sin(am(t, 1)) - tanh(t)", "holds"),
         ("wp3(-t, 4, a) - wp3(t, 4, a)", "holds"),
@@ -143,10 +163,24 @@ def test_degenerate_values_nomes_and_later_branches_are_decided(text: str, expec
     assert rotation(f"1 + t*({text})", ["0 < a < 1"], parameters={"a": "1/2"}).verdict == expected
 
 
-@pytest.mark.parametrize("text", ["am(1, 2)", "ellipticF(1, 1)", "ellipticPi(2, 1, 1/2)", "modulus(2)"])
+@pytest.mark.parametrize(
+    "text", ["am(1, 2)", "ellipticF(1, 1)", "ellipticPi(2, 1, 1/2)", "modulus(2)", "sn(1, -1/10)", "cn(1, 11/10)"]
+)
 def test_beyond_the_parameters_there_is_no_value(text: str) -> None:
     assert not evaluate(formula(text), {}, 100).is_finite()
 
 
 def test_a_parameter_may_have_the_name_of_an_elliptic_function() -> None:
     assert rotation("nome", parameters={"nome": "1/2"}).verdict == "holds"
+
+
+@pytest.mark.parametrize("text", ["sn(t)", "sn(t, 1/2, 3)", "sn", "cn()", "dn t"])
+def test_wrong_calls_are_refused(text: str) -> None:
+    with pytest.raises(InputError):
+        rotation(text)
+
+
+def test_an_unknown_name_lists_the_functions() -> None:
+    with pytest.raises(InputError, match="unknown name 'sd'") as error:
+        rotation("sd(t, 1/2)")
+    assert "sn, cn, dn" in error.value.remedy
