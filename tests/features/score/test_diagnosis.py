@@ -98,9 +98,6 @@ def found(top: HeavyTop, start: State, times: list[Fraction], states: np.ndarray
 PLANTED = {
     "gamma_down": lambda top, start, times, y: (top, start, times, y * [1, 1, 1, -1, -1, -1]),
     "momentum": lambda top, start, times, y: (top, start, times, y * [*map(float, top.inertia), 1, 1, 1]),
-    "omega_in_degrees": lambda top, start, times, y: (top, start, times, y * ([180 / np.pi] * 3 + [1] * 3)),
-    "columns_swapped": lambda top, start, times, y: (top, start, times, y[:, [3, 4, 5, 0, 1, 2]]),
-    "axes_permuted": lambda top, start, times, y: (top, start, times, y[:, [1, 2, 0, 4, 5, 3]]),
     "weight_sign": lambda top, start, times, y: (HeavyTop(top.inertia, -top.weight, top.centre), start, times, y),
     "start_gamma_sign": lambda top, start, times, y: (top, State(start.omega, [-g for g in start.gamma]), times, y),
     "weight": lambda top, start, times, y: (HeavyTop(top.inertia, top.weight * SHIFT * 6, top.centre), start, times, y),
@@ -116,8 +113,6 @@ PLANTED = {
     "start_row_missing": lambda top, start, times, y: (
         top, start, times, np.vstack([[float(v) for v in start.flat], y[:-1]])),
     "rows_reversed": lambda top, start, times, y: (top, start, times, y[::-1]),
-    "rows_off_by_one": lambda top, start, times, y: (top, start, times[:-1], y[1:]),
-    "rows_late": lambda top, start, times, y: (top, start, times[1:], y[:-1]),
 }  # fmt: skip
 
 
@@ -139,9 +134,7 @@ def test_a_planted_mistake_is_named(kind: str, seed: int) -> None:
     }.get(kind, {})
     for name, value in expected.items():
         assert float(Fraction(told.numbers[name])) == pytest.approx(float(value), rel=1e-4)
-    assert set(told.numbers) == set(expected) | ({"axes", "of"} if kind == "axes_permuted" else set()) | (
-        {"axes"} if kind == "inertia_axes" else set()
-    )
+    assert set(told.numbers) == set(expected) | ({"axes"} if kind == "inertia_axes" else set())
     sentence = diagnosis_text(told)
     assert sentence.endswith(".")
     assert len(sentence) < 240

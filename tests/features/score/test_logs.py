@@ -1,6 +1,7 @@
 """Logs of robots, spacecraft and simulators: one motion in every form is scored as the plain file of it."""
 
 import json
+import sys
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from pathlib import Path
@@ -9,6 +10,8 @@ import numpy
 import pytest
 
 import heavytop as ht
+from heavytop.errors import InputError
+from heavytop.features.score.trajectories.bags import of_bag, storage
 from heavytop.features.score.trajectories.columns import header
 from support.in_process import heavytop, printed
 
@@ -409,3 +412,18 @@ def test_a_joint_that_slips_is_in_no_other_unit_of_length(tmp_path: Path) -> Non
 
 def test_rows_of_kitti_are_refused_with_the_line_that_names_them(tmp_path: Path) -> None:
     assert "t R11 R12 R13 px R21" in refusal(tmp_path / "poses.txt", HEAD + "1 0 0 0 0 1 0 0 0 0 1 0\n")
+
+
+def test_without_the_package_one_sentence_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "rosbags", None)
+    with pytest.raises(InputError, match=r"needs the extra logs: pip install"):
+        of_bag(tmp_path / "log.mcap")
+
+
+def test_a_folder_is_the_bag_in_it(tmp_path: Path) -> None:
+    assert storage(tmp_path) == tmp_path
+    (tmp_path / "metadata.yaml").touch()
+    (tmp_path / "log_0.mcap").touch()
+    assert storage(tmp_path) == tmp_path / "log_0.mcap"
+    (tmp_path / "log_1.mcap").touch()
+    assert storage(tmp_path) == tmp_path
