@@ -66,6 +66,15 @@ def test_printed_formulas_that_die_are_said_not_to_be_finite() -> None:
 
 
 @pytest.mark.slow
+def test_the_verdict_on_the_claim_is_a_row() -> None:
+    row = measure(task("audit ershkov-partial heavy_top"))
+    refuted = {name for name, metric in row.metrics.items() if metric.value == "0" and " smooth " in name}
+    assert {name.split()[0] for name in refuted} == {"(1.2).1", "(1.2).3", "(3.1).2"}
+    row = measure(task("audit ershkov-partial gyrostat"))
+    assert {metric.value for metric in row.metrics.values()} == {"1"}
+
+
+@pytest.mark.slow
 def test_a_run_that_fails_is_a_row_with_its_outcome(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "MOST_STEPS", 10**400)  # so that what overflows is tried
     monkeypatch.setattr(motions, "_FASTEST", 10**400)  # and in the unit of time given

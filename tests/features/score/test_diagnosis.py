@@ -113,6 +113,8 @@ PLANTED = {
     "start_row_missing": lambda top, start, times, y: (
         top, start, times, np.vstack([[float(v) for v in start.flat], y[:-1]])),
     "rows_reversed": lambda top, start, times, y: (top, start, times, y[::-1]),
+    "rows_off_by_one": lambda top, start, times, y: (top, start, times[:-1], y[1:]),
+    "rows_late": lambda top, start, times, y: (top, start, times[1:], y[:-1]),
 }  # fmt: skip
 
 
