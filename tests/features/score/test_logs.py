@@ -403,6 +403,24 @@ def test_stamps_of_a_start_that_is_given_are_counted_from_it(tmp_path: Path) -> 
         assert "nanosec" not in shown.stderr
 
 
+def test_instants_of_a_calendar_are_times_over_a_leap_second(tmp_path: Path) -> None:
+    stamps = [*(f"59.{tenth}" for tenth in range(5, 10)), *(f"60.{tenth}" for tenth in range(6))]
+    lines = [f"2016-12-31 23:59:{s}Z,{row}" for s, row in zip(stamps, rows(quaternions()).splitlines(), strict=True)]
+    path, names = tmp_path / "log.csv", "timestamp,qw,qx,qy,qz\n"
+    assert digits(path, HEAD + names + "\n".join(lines)) > 13
+    lines[3] = lines[3].replace("Z", "+02:00")
+    assert "is not an epoch" in refusal(path, HEAD + names + "\n".join(lines))
+
+
+def test_the_data_of_a_body_are_no_columns_where_there_are_as_many_rows(tmp_path: Path) -> None:
+    keys = dict(line[2:].split(": ") for line in HEAD.splitlines() if line.startswith("#") and ": " in line)
+    data = {key: [float(v) for v in text.split(",")] if "," in text else text for key, text in keys.items()}
+    for count in (3, 6):
+        path = tmp_path / f"log{count}.npz"
+        numpy.savez(path, t=TIMES[:count], quaternions=quaternions()[:count], **data)
+        assert digits(path) > 13
+
+
 def test_a_joint_that_slips_is_in_no_other_unit_of_length(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(mujoco("free", 1e-5))

@@ -46,9 +46,6 @@ from heavytop.top.heavy_top import HeavyTop, State, check_times, require_physica
 
 REMEDY = "`heavytop docs score` describes both file formats; `heavytop list --case lagrange` prints an example."
 COLUMNS = ("t", *VARIABLES)
-VECTORS = ("inertia", "centre", "omega", "gamma", "rotor")
-LISTS = (*VECTORS, "omega_space", "pivot", "point", "start_quaternion", "start_matrix", "start_euler")
-"""Keys whose values are lists of numbers."""
 _COMMENT = ("#", "%", "!", "//")
 _REMARK = re.compile(r"((?<!1\.)#|#(?!inf|ind|qnan|snan)).*", re.IGNORECASE)
 """Remarks after the numbers of a line; an older C library writes infinity and NaN as 1.#INF and 1.#QNAN."""
@@ -88,6 +85,10 @@ def read_table(text: str, started: bool = False) -> tuple[dict[str, Any], list[s
     header = next((names for names in reversed(comments) if _is_header(names, len(first))), None)
     if not _is_number(first[0]):
         header, body, lines = first, body[1:], lines[1:]
+        below = _cells(body[0], separator) if body else []
+        if len(below) == len(first) and not _is_number(below[0]) and not any(map(_is_number, {*below} - {"1", "1/s"})):
+            header = [f"{name} [{unit.strip('[]()')}]" for name, unit in zip(first, below, strict=True)]
+            body, lines = body[1:], lines[1:]
     names, notes = _without_header(first) if header is None else (header, [])
     if not body:
         raise InputError("The table has no rows below its header.", "Give a row for each time.")
@@ -164,7 +165,7 @@ def _take_key(comment: str, keys: dict[str, str | list[str]]) -> bool:
         return False
     if key in keys:
         raise InputError(f"The key {key} occurs twice.", "Give each key once.")
-    keys[key] = _numbers(key, value.strip("[]() ")) if key in LISTS else value
+    keys[key] = _numbers(key, value.strip("[]() ")) if key in logs.LISTS else value
     return True
 
 
@@ -329,7 +330,7 @@ def _briefly(value: Fraction) -> str:
 
 
 _FLAGS = ("language", "tolerance", "step")
-_KEYS = {*VECTORS, *_FLAGS, "weight", "system", "times", "states", "precision", "bits", "name", "integrator"}
+_KEYS = {*logs.VECTORS, *_FLAGS, "weight", "system", "times", "states", "precision", "bits", "name", "integrator"}
 _KEYS |= {"outcome", "steps", *observed_columns.KEYS}
 _NOT_READ = {
     "time_reached",

@@ -23,8 +23,12 @@ from heavytop.precision import decimal_text, exact_text
 
 NAMES = "Call quaternions qw,qx,qy,qz, Ω omega1,omega2,omega3, matrices R11 to R33, times t."
 TUM = ("timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
+VECTORS = ("inertia", "centre", "omega", "gamma", "rotor")
+LISTS = (*VECTORS, "omega_space", "pivot", "point", "start_quaternion", "start_matrix", "start_euler")
+"""Keys whose values are lists of numbers."""
 KITTI = ("R11", "R12", "R13", "px", "R21", "R22", "R23", "py", "R31", "R32", "R33", "pz")
 _STAMP = re.compile(r"(?:.*[./_])?(?:stamp|time|clock)[./_](secs?|n(?:ano)?secs?)", re.IGNORECASE)
+_INSTANT = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:")
 _EPOCHS = ("timestamp", "stamp", "epoch")
 """Names of columns of times that are counted from their first row."""
 _COUNTED = (*_EPOCHS, "t", "time")
@@ -153,6 +157,10 @@ def with_one_time(
         del names[nano]
     plain = [canonical(name) for name in names]
     words = [name.partition(" ")[0] for name in plain]
+    for place, word in enumerate(words):
+        if word.lower() in _COUNTED and _INSTANT.match(cells[0][place]):
+            for row in cells:
+                row[place] = decimal_text(_epoch(row[place].replace(" ", "T")), 40)
     index = next((index for word in _COUNTED for index in _places(word, words, cells)), None)
     if index is None or (words[index] == "epoch" and {"t", "time"} & set(words)):
         return names, cells, []
@@ -333,15 +341,16 @@ _LEAPS += [(year, 7) for year in (1972, 1981, 1982, 1983, 1985, 1992, 1993, 1994
 
 def _epoch(text: str, system: str = "UTC") -> Fraction:
     """Seconds of an epoch, calendar date or day of the year, exactly; in UTC with the leap seconds before it."""
-    whole, _, part = text.rstrip("Z").partition(".")
+    whole, _, part = re.sub(r"Z|\+00:00", "", text).partition(".")
     is_leap = system == "UTC" and whole.endswith(":59:60")
     for pattern in ("%Y-%m-%dT%H:%M:%S", "%Y-%jT%H:%M:%S"):
         try:
             moment = datetime.strptime(whole[:-2] + "59" if is_leap else whole, pattern).replace(tzinfo=UTC)
+            fraction = Fraction(int(part or 0), 10 ** len(part))
         except ValueError:
             continue
         leaps = sum(month <= (moment.year, moment.month) for month in _LEAPS) if system == "UTC" else 0
-        return int(moment.timestamp()) + leaps + is_leap + Fraction(f"0.{part or 0}")
+        return int(moment.timestamp()) + leaps + is_leap + fraction
     raise InputError(f"{quoted(text)} is not an epoch.", "Write it as 2026-01-31T12:00:00.5.")
 
 
@@ -361,7 +370,8 @@ def of_arrays(content: bytes, suffix: str) -> str:
     parts: list[Any] = []
     comments = []
     for name, array in columns.items():
-        if array.ndim == 0 or (array.size <= 9 and (array.dtype.kind in "US" or len(array) != count)):
+        is_key = name in LISTS and (array.ndim == 1 or name not in ("omega", "gamma", "omega_space"))
+        if array.ndim == 0 or (array.size <= 9 and (array.dtype.kind in "US" or is_key or len(array) != count)):
             comments.append(f"# {name}: {', '.join(map(str, array.ravel().tolist()))}")
         elif array.ndim <= 3 and array.size and array.dtype.kind in "fiu":
             parts.append(array.reshape(len(array), -1))
@@ -416,7 +426,7 @@ def _columns_of(table: Any) -> dict[str, Any]:
     }
     for name in table.column_names:
         kind = table[name].type
-        if pyarrow.types.is_timestamp(kind):
+        if pyarrow.types.is_timestamp(kind) or pyarrow.types.is_duration(kind):
             columns[f"timestamp [{kind.unit}]"] = numpy.asarray(table[name].cast(pyarrow.int64()))
         else:
             nested = hasattr(kind, "value_type")
