@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
-
-import numpy
 
 from heavytop.display import printable
 from heavytop.errors import InputError
@@ -300,11 +298,10 @@ def check_keys(file: Path | str, rows: Iterable[Row]) -> None:
         identities.add(row.identity)
 
 
-def check_rows(file: Path, rows: Sequence[Row], kinds: Kinds) -> None:
+def check_rows(file: Path, rows: Iterable[Row], kinds: Kinds) -> None:
     """Raises InputError for an impossible or contradictory row, with its name and field."""
-    doubtful = _doubtful_metrics([metric for row in rows for metric in row.metrics.values()])
     for row in rows:
-        _refuse_first(file, row, _problems(row, kind_of(row, kinds), doubtful))
+        _refuse_first(file, row, _problems(row, kind_of(row, kinds)))
 
 
 def check_seconds(file: Path, rows: Iterable[Row], kinds: Kinds) -> None:
@@ -319,18 +316,14 @@ def _refuse_first(file: Path, row: Row, problems: Iterable[str]) -> None:
         raise InputError(f"{where}, {printable(problem)[:260].rstrip('.')}.", REMEDY)
 
 
-def _problems(row: Row, kind: ReportedKind, doubtful: set[int]) -> Iterator[str]:
-    """Faults of a row, as ``FIELD: REASON``; only the first counts, as later ones may follow from it.
-
-    doubtful: ids of the metrics to be checked one by one.
-    """
+def _problems(row: Row, kind: ReportedKind) -> Iterator[str]:
+    """Faults of a row, as ``FIELD: REASON``; only the first counts, as later ones may follow from it."""
     yield from _of_fields(row, kind)
     for name, law in row.laws.items():
         yield from (f"growth {name[:60]}, {problem}" for problem in _of_law(law))
-    if doubtful:
-        for name, metric in row.metrics.items():
-            if id(metric) in doubtful:
-                yield from (f"{name[:60]}: {problem}" for problem in _of_metric(metric, row.finite))
+    for name, metric in row.metrics.items():
+        if not _is_plain(metric):
+            yield from (f"{name[:60]}: {problem}" for problem in _of_metric(metric, row.finite))
     for name, series in row.series.items():
         yield from (f"{name[:60]}: {problem}" for problem in _of_series(series))
     yield from contradictions(row, kind)
@@ -415,22 +408,15 @@ def _negative(text: str) -> str:
     return f"{text} is negative" if exact(text) < 0 else ""
 
 
-def _doubtful_metrics(metrics: Sequence[Metric]) -> set[int]:
-    """The ids of the metrics that are not a number with its logarithm, found by one vectorized test."""
-    values = numpy.array(_floats([metric.value for metric in metrics]))
-    logarithms = numpy.array([metric.log10 if metric.bound is None else None for metric in metrics], dtype=float)
-    with numpy.errstate(all="ignore"):
-        # a negative number has no logarithm
-        plain = numpy.abs(numpy.log10(values) - logarithms) < CLOSE / 2
-    return set() if plain.all() else {id(metrics[index]) for index in numpy.flatnonzero(~plain).tolist()}
-
-
-def _floats(texts: Sequence[str]) -> list[float]:
-    """The texts as floats; nan alone where a text is not a number, or one in Python only."""
+def _is_plain(metric: Metric) -> bool:
+    """Whether a metric is a positive number in the range of double with its logarithm, as most are."""
+    text, logarithm = metric.value, metric.log10
+    if logarithm is None or metric.bound is not None or "_" in text or not text.isascii():
+        return False
     try:
-        return list(map(float, texts)) if _plain_numbers(texts) else [math.nan]
+        return abs(math.log10(float(text)) - logarithm) < CLOSE / 2
     except ValueError:
-        return [math.nan]
+        return False
 
 
 def _plain_numbers(texts: Iterable[str]) -> bool:
