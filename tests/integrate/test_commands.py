@@ -82,6 +82,7 @@ DIAGNOSED = {
     "wrong backwards": ("backwards", "steps backward in time are wrong"),
     "swapped": ("one time", "check the order of the components"),
     "other each time": ("determinism", "Equal requests give different states"),
+    "whole last steps": ("many times", "without other samples a run to t = 1 is right, so check the last step"),
     "knows too little": ("unknown lines", "An unknown line is not ignored"),
     "ignores quit": ("quit", "The program does not exit within 0.2 s of quit"),
     "outlives its input": ("end of input", "The program does not exit within 0.2 s of the end of input"),
@@ -150,6 +151,21 @@ def test_what_no_row_can_see_the_check_of_the_contract_names(fault: str, monkeyp
     part, text = DIAGNOSED[fault]
     found = judged(program(fault), part)
     assert (found.verdict, text in found.text) == ("violated", True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("fault", "part", "verdict", "text"),
+    [
+        ("dies at the fourth request", "unknown lines", "violated", "rk4 ended with exit code 1 before it said done"),
+        ("begins otherwise", "two processes", "violated", "A new process answers otherwise than one in use"),
+        ("other each time", "two processes", "note", "Not tested: one process answers equal requests with different"),
+    ],
+)
+def test_what_follows_from_an_earlier_request_is_not_charged_to_the_next(fault, part, verdict, text) -> None:
+    judged(program(fault), "one time")
+    found = judged(program(fault), part)
+    assert (found.verdict, found.text[: len(text)]) == (verdict, text)
 
 
 @pytest.mark.slow
@@ -351,12 +367,26 @@ def test_a_file_is_named_by_itself_or_with_the_name_of_one_of_its_programs(tmp_p
             named(bad)
 
 
-@pytest.mark.parametrize("line", [["./absent"], ["./mine.toml"], ["surely-no-such-program"]])
-def test_a_program_that_is_not_there_is_a_failure_of_its_rows(tmp_path: Path, line: list[str]) -> None:
+@pytest.mark.parametrize(
+    ("line", "cause"),
+    [
+        (["./absent"], "the program ./absent does not exist"),
+        (["./mine.toml"], "the program ./mine.toml is not executable"),
+        (["surely-no-such-program"], "the program surely-no-such-program does not exist"),
+        ([f"{Path(sys.executable).name} -S"], "does not exist"),
+        (["./"], "the program ./ is a folder"),
+        (["./script"], "cannot be started: its interpreter does not exist"),
+    ],
+)
+def test_a_program_that_is_not_there_is_a_failure_of_its_rows(tmp_path: Path, line: list[str], cause: str) -> None:
     toml(tmp_path)
+    (tmp_path / "script").write_text("#!/surely/no/such/interpreter\n")
+    (tmp_path / "script").chmod(0o755)
     given = msgspec.structs.replace(program(), command=tuple(line), folder=str(tmp_path))
-    with pytest.raises(PeerFailed, match=r"the program .* does not exist|is not executable"):
+    with pytest.raises(PeerFailed, match=cause) as caught:
         registry.ready(given)(CASE.top, CASE.start, TIMES, DOUBLE)
+    assert caught.value.remedy == commands.COMMAND_REMEDY
+    assert judged(given, "start").text.endswith(commands.COMMAND_REMEDY)
 
 
 @pytest.mark.slow

@@ -150,6 +150,7 @@ def test_the_steps_of_a_fixed_grid_divide_every_time_or_the_row_is_unsupported()
     )
     for times in (
         [Fraction(i, 5) for i in range(1, 11)],
+        [Fraction(i / 5) for i in range(1, 11)],  # as rounded to the format
         [Fraction(1, 4), Fraction(1), Fraction(3, 2)],
         [Fraction(2, 7)],
     ):

@@ -121,7 +121,7 @@ def answer(fault, given):
         if fault == "wrong backwards" and end < t:
             y[2] *= 1 + 1e-7
         for _ in range(count):
-            y = step(lambda y: HEAVY_TOP.field(p, y), y, (end - t) / count)
+            y = step(lambda y: HEAVY_TOP.field(p, y), y, h if fault == "whole last steps" else (end - t) / count)
         t, steps = end, steps + count
         out("state", text, *shown(fault, y, place))
         if fault == "ends in the middle":
@@ -175,8 +175,10 @@ def main():
             requests += 1
             if fault == "naps":
                 time.sleep(0.03)
-            if fault == "dies at the third request" and requests == 3:
+            if fault == {3: "dies at the third request", 4: "dies at the fourth request"}.get(requests):
                 sys.exit("out of memory")
+            if fault == "begins otherwise" and requests == 1:
+                given["inertia"][0] += "1"
             if int(given["times"][0]) and fault in INSTEAD:
                 INSTEAD[fault]()
             elif given["times"] == ["0"]:

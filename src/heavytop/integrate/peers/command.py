@@ -18,6 +18,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from errno import ENOENT
 from fractions import Fraction
 from itertools import pairwise
 from math import ceil, inf, isfinite
@@ -29,7 +30,7 @@ from typing import Any, Literal
 import msgspec
 import numpy
 
-from heavytop.errors import InputError, PeerFailed, Unsupported, argument
+from heavytop.errors import InputError, PeerFailed, Unsupported, argument, why
 from heavytop.guard import Guard, how_it_ended, stopwatch, waited_for_processor
 from heavytop.integrate.peers.contract import DEFAULT_STEP, Declared, of_quaternion, quaternion, require_control, said
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
@@ -44,6 +45,9 @@ from heavytop.written_numbers import number as written_number
 HELLO = "heavytop-integrator 1"
 PYTHON = "{python}"
 """In a command, the Python interpreter of heavytop."""
+COMMAND_REMEDY = (
+    "Correct `command`: a program on the PATH or relative to its file, then each argument as an item of its own."
+)
 NOT_COUNTED = {"steps": "not counted"}
 """The flag of a run whose program did not report its number of steps."""
 _MOST_LINE = 1 << 20
@@ -129,10 +133,9 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         """The program as an absolute path and its arguments; raises PeerFailed if it is missing."""
         program, *arguments = (sys.executable if part == PYTHON else part for part in self.command)
         path = str(Path(self.folder, program)) if "/" in program else shutil.which(program) or ""
-        if not os.path.isfile(path):
-            raise PeerFailed(f"{self.name}: the program {said(program)} does not exist")
-        if not os.access(path, os.X_OK):
-            raise PeerFailed(f"{self.name}: {said(program)} is not executable")
+        wrong = "is a folder" if os.path.isdir(path) else "does not exist" if not os.path.isfile(path) else ""
+        if wrong or not os.access(path, os.X_OK):
+            raise PeerFailed(f"{self.name}: the program {said(program)} {wrong or 'is not executable'}", COMMAND_REMEDY)
         return [os.path.abspath(path), *arguments]
 
     def integrate(
@@ -157,7 +160,7 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         declared.require(self.name, start, system, instants[-1], precision, xi)
         value = self._control_value(control, precision)
         if value is not None and self.control == "step":
-            value = rounded(declared.step(self.name, value, instants), precision)
+            value = rounded(declared.step(self.name, value, instants, precision), precision)
         problem = Problem.of(top, start, precision, system, xi)
         grid = [rounded(time, precision) for time in instants]
         request = self.request(problem, grid, value)
@@ -392,7 +395,8 @@ class Session:
             )
         except OSError as error:
             self._guard.end()
-            raise PeerFailed(f"{self.name} cannot be started: {said(error)}") from None
+            cause = "its interpreter does not exist" if error.errno == ENOENT else why(error)
+            raise PeerFailed(f"{self.name} cannot be started: {cause}", COMMAND_REMEDY) from None
         self._pipes = [pipe for pipe in (self.process.stdin, self.process.stdout, self.process.stderr) if pipe]
         self._in, self._out, self._err = (pipe.fileno() for pipe in self._pipes)
         for descriptor in (self._in, self._out, self._err):

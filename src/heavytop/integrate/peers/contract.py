@@ -41,6 +41,7 @@ _OFF_SPHERE = Fraction(1, 10**6)
 """By which |γ|² may differ from 1 where a quaternion stands for it, and radians between directions that are one."""
 _FINER = 16
 """A step may be shortened so many times at most, so that all times are multiples of it."""
+_DENOMINATOR = 10**6
 _ALONE = RLock()
 """Standard output and warnings belong to the process, not to a thread: third-party code runs alone."""
 
@@ -194,11 +195,13 @@ class Declared:
         """Whether its coordinates are singular at that γ."""
         return any(_along(gamma, direction) for direction in self.singular_at)
 
-    def step(self, name: str, step: Fraction, times: Sequence[Fraction]) -> Fraction:
-        """The step to request: on a fixed grid the largest up to ``step`` of which all times are multiples.
+    def step(self, name: str, step: Fraction, times: Sequence[Fraction], precision: Precision) -> Fraction:
+        """The step to request: on a fixed grid the largest up to ``step`` of which all times, before they were rounded
+        to the format, are multiples.
 
         Raises Unsupported where that is a small part of ``step``.
         """
+        times = [_before_rounding(time, precision) for time in times] if self.fixed_grid else times
         scale = lcm(*(time.denominator for time in times))
         spacing = Fraction(gcd(*(int(time * scale) for time in times)), scale)
         if not (self.fixed_grid and spacing):
@@ -210,6 +213,12 @@ class Declared:
                 "Give equally spaced times.",
             )
         return fitted
+
+
+def _before_rounding(time: Fraction, precision: Precision) -> Fraction:
+    """The fraction with a denominator of at most six digits that rounds to ``time``; ``time`` if none does."""
+    near = time.limit_denominator(_DENOMINATOR)
+    return near if rounded(near, precision) == rounded(time, precision) else time
 
 
 def _along(gamma: Vector, direction: Vector) -> bool:
@@ -312,7 +321,7 @@ class CheckedPlugin:
         if self.declared is not None and asked:
             self.declared.require(self.name, start, system, asked[-1], precision, xi)
             if self.declared.fixed_grid:
-                beside["step"] = self.declared.step(self.name, beside.get("step", DEFAULT_STEP), times)
+                beside["step"] = self.declared.step(self.name, beside.get("step", DEFAULT_STEP), times, precision)
         # copies, so that what a peer does to its arguments is its own affair; fractions are shared by deepcopy
         arguments: list[Any]
         own: dict[str, Any]
