@@ -236,4 +236,4 @@ def test_what_explains_errors_is_said_of_errors_alone() -> None:
     assert said[0].startswith("Seconds run 100 s → 300 s on euler")
     assert not any("order" in each for each in said)
     unasked = failing(old[0], "not_asked", "out of time in 2 other rows")
-    assert found(old[:1], [unasked])[0].endswith("not_asked, out of time in 2 other rows.")
+    assert found(old[:1], [unasked])[0].endswith("is not measured: not_asked, out of time in 2 other rows.")

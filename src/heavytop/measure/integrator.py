@@ -244,8 +244,9 @@ def doubtful_counts(run: Trajectory, error: Fraction | None) -> str:
     if error >= exact(float(bound)):
         return ""
     return (
-        f"It counts {run.steps} steps of {angle:.2g} rad: of order {run.order} they would be off by {bound:.1g}, and "
-        f"it is off by {decimal_text(error, 2)}: it is exact on this motion, or takes more steps than it counts."
+        f"It counts {run.steps} steps of {angle:.2g} rad: of order {run.order} they would be off by more than "
+        f"{bound:.1g}, and it is off by {decimal_text(error, 2)}: it is exact on this motion, or takes more steps than "
+        "it counts."
     )
 
 

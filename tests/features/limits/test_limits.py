@@ -10,7 +10,8 @@ import pytest
 
 import heavytop as ht
 from heavytop.cases import CASES
-from heavytop.features.limits.power import FAULTS
+from heavytop.features.limits.power import _MOST_STEPS, _STEP_SECONDS, FAULTS, expected_seconds
+from heavytop.integrate.peers.double import Solution, double_peer
 from support.helpers import START, TOP
 from support.in_process import heavytop
 
@@ -117,6 +118,26 @@ def test_what_changes_nothing_is_not_planted_and_what_is_unknown_is_refused() ->
     ):
         with pytest.raises(ht.InputError, match=words):
             call()
+
+
+def test_a_tolerance_as_printed_detects_the_fault() -> None:
+    test = ht.power(TOP, START, 1, "1e-3", "1/4")
+    for name, _, printed in test._table().rows:
+        assert ht.power(TOP, START, 1, printed, "1/4", name).detects_all
+
+
+def test_a_test_of_hours_is_refused_with_an_end_in_reach() -> None:
+    with pytest.raises(ht.OutOfReach, match=r"up to t = 1e.09 takes about .* steps") as caught:
+        ht.power(*LAGRANGE, 10**9, "1e-3")
+    earlier = caught.value.remedy.removesuffix(".").split()[-1]
+    assert 0.9 * _MOST_STEPS < (expected_seconds(*LAGRANGE, earlier) - 1) / _STEP_SECONDS <= _MOST_STEPS
+
+
+def test_a_right_run_that_ends_early_has_no_error_but_an_end() -> None:
+    stuck = double_peer("stuck", 4, lambda given: Solution([], 0.0, 0, 0), "step")
+    test = ht.power(TOP, START, 1, "1e-3", "1/4", "late", integrator=stuck)
+    assert not test.passes
+    assert "a correct run fails: it does not reach t = 1" in str(test)
 
 
 def test_the_command_line_says_the_same(tmp_path: Path) -> None:

@@ -10,9 +10,6 @@ from heavytop.cli.app import Json, cases, command, numbers, print_json
 from heavytop.cli.output import counted
 from heavytop.errors import ExitCode, InputError
 
-_SECONDS = 1.0
-"""Expected duration of a test with its faults."""
-
 
 @command
 def power(
@@ -26,7 +23,7 @@ def power(
     quaternion: Annotated[str, typer.Option(help="With --file: attitude w,x,y,z at t = 0.")] = "1,0,0,0",
     step: Annotated[str | None, typer.Option(help="Time between samples; default: --until/100.")] = None,
     planted: Annotated[str, typer.Option(help="Names of faults, or all.")] = "all",
-    integrator: Annotated[str, typer.Option(help="Format of the correct run.")] = "heyoka",
+    integrator: Annotated[str, typer.Option(help="Integrator of the correct run.")] = "heyoka",
     control: Annotated[str | None, typer.Option(help="Tolerance or step of the correct run.")] = None,
     json: Json = False,
 ) -> int:
@@ -36,6 +33,7 @@ def power(
     does by --until.  Exit 0 where a right run passes and every fault is detected, else 1.
     """
     from heavytop.cases import case as case_named
+    from heavytop.features.limits.power import expected_seconds
     from heavytop.features.limits.power import power as power_of
     from heavytop.top.bodies import motion_of
 
@@ -53,7 +51,7 @@ def power(
         data = {"file": file, "link": link, "gravity": gravity, "omega": omega and numbers(omega)}
         top, start = motion_of(data | {"quaternion": numbers(quaternion)})
         system = None
-    with counted("power", 1, "tests", _SECONDS) as advance:
+    with counted("power", 1, "tests", expected_seconds(top, start, until, system)) as advance:
         test = power_of(
             top, start, until, tolerance, step, planted, integrator=integrator, control=control, system=system
         )

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from decimal import ROUND_DOWN, Context
 from fractions import Fraction
 from functools import partial
+from math import isfinite
 from typing import Any
 
 import numpy
@@ -17,9 +19,10 @@ import numpy
 from heavytop import arguments
 from heavytop.arguments import Number
 from heavytop.display import Tabular, TitledTable
-from heavytop.errors import InputError, quoted, refusal
+from heavytop.errors import InputError, OutOfReach, quoted, refusal
 from heavytop.integrate.frames import Setup
-from heavytop.integrate.registry import control_name, named, propagator
+from heavytop.integrate.registry import control_name, expected_steps, named, propagator
+from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE, QUAD, Array, Precision, Scalar, cross, exact_text, physical, real, six_digits
 from heavytop.top.bodies import PIVOT, Body
 from heavytop.top.equations import GYROSTAT, Parameters, System
@@ -28,6 +31,8 @@ from heavytop.top.inertia_slips import minus, plus, six_of, steiner
 
 Motion = tuple[HeavyTop | Body, State, System]
 _MOST = 100_000
+_MOST_STEPS, _STEP_SECONDS = 10**7, 2e-4
+"""Expected steps of a motion, and seconds of one for the fault ``float32``."""
 _G = Fraction("9.8") / Fraction("9.81")
 
 
@@ -36,7 +41,7 @@ class PlantedFault:
     """A planted fault and its detection.
 
     errors: the largest of a component at each time.  detected_from: the first time at which they exceed the tolerance;
-    None where the test passes.  tolerance: the largest error, which a tolerance must stay below.
+    None where the test passes.  tolerance: the largest error, which a tolerance must stay below: printed rounded down.
     """
 
     name: str
@@ -87,13 +92,13 @@ class Power(Tabular):
             (
                 fault.name,
                 "not detected" if fault.detected_from is None else six_digits(fault.detected_from),
-                f"{fault.tolerance:.2g}",
+                _rounded_down(fault.tolerance),
             )
             for fault in self.faults
         ]
         end = six_digits(self.times[-1])
-        verdict = "passes" if self.passes else "fails"
-        notes = [f"a correct run {verdict}: its largest error is {self.error:.2g}"]
+        said = f"{'passes' if self.passes else 'fails'}: its largest error is {self.error:.2g}"
+        notes = [f"a correct run {said if isfinite(self.error) else f'fails: it does not reach t = {end}'}"]
         notes += [f"{name} is not planted: {why}" for name, why in self.left_out.items()]
         title = f"A test up to t = {end} with tolerance {self.tolerance:.2g}"
         return TitledTable(title, ("planted fault", "detected from t", "widest tolerance"), rows, notes)
@@ -125,11 +130,9 @@ def power(
 
     Raises:
         InputError: for an invalid motion, an unknown fault, more than 100,000 samples, and for other numbers.
+        OutOfReach: for a test of more than some ten million steps, which takes hours.
     """
-    body, state = arguments.motion(top, start)
-    motion = body, state, arguments.system(system, body)
-    if motion[2] is GYROSTAT:
-        raise InputError("power does not support the system gyrostat.", "Use heavy_gyrostat, with a rotor.")
+    motion = _motion(top, start, system)
     end, limit = physical(until, "until"), float(physical(tolerance, "tolerance"))
     spacing = end / 100 if step is None else physical(step, "step")
     if not (0 < spacing <= end and limit > 0):
@@ -139,6 +142,7 @@ def power(
     if count > _MOST:
         raise InputError(f"At most {_MOST} samples; got {count}.", "Give a larger step, or an earlier end.")
     times = [spacing * k for k in range(1, count + 1)]
+    expected_seconds(*motion[:2], times[-1], motion[2])
     true, method = _rows(motion, times), named(integrator)
     options = {} if control is None else {control_name(method) or "tolerance": physical(control, "control")}
     error = float(_errors(_states(motion, times, DOUBLE, method, options), _states(motion, times, QUAD)).max())
@@ -152,6 +156,33 @@ def power(
         detected_from = next((time for time, error in zip(times, errors, strict=True) if error > limit), None)
         faults.append(PlantedFault(name, errors, detected_from, float(errors.max())))
     return Power(tuple(times), limit, error, tuple(faults), left_out)
+
+
+def expected_seconds(top: Any, start: Any, until: Number, system: System | str | None = None) -> float:
+    """The seconds of a test to the time ``until``, nearly all for ``float32``; raises OutOfReach for hours."""
+    body, state, system = _motion(top, start, system)
+    end, setup = physical(until, "until"), Setup.of(body, state, DOUBLE, system)
+    steps = expected_steps(Problem.of(setup.top, setup.start, DOUBLE, system), end)
+    if steps > _MOST_STEPS:
+        earlier = _rounded_down(float(end * _MOST_STEPS / steps))
+        raise OutOfReach(
+            f"A test up to t = {six_digits(end)} takes about {six_digits(Fraction(steps))} steps for each fault.",
+            f"At most {six_digits(Fraction(_MOST_STEPS))} are supported: give an end up to {earlier}.",
+        )
+    return 1 + _STEP_SECONDS * steps
+
+
+def _motion(top: Any, start: Any, system: System | str | None) -> Motion:
+    body, state = arguments.motion(top, start)
+    chosen = arguments.system(system, body)
+    if chosen is GYROSTAT:
+        raise InputError("power does not support the system gyrostat.", "Use heavy_gyrostat, with a rotor.")
+    return body, state, chosen
+
+
+def _rounded_down(value: float) -> str:
+    """Two digits, so that a tolerance as printed detects the error."""
+    return f"{float(Context(2, ROUND_DOWN).create_decimal(value)):.2g}"
 
 
 def _names(planted: str | Sequence[str]) -> list[str]:

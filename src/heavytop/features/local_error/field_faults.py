@@ -39,6 +39,8 @@ _REFINED = 4
 _NEAR = 30.0
 """Multiple of the remaining error within which a fitted factor is rounded."""
 _DIGITS = range(1, 12)
+_NEAR_ONE = 1e-6
+"""Factors closer to 1 are said by their difference from it."""
 _LENGTHS = 1, 2, 4
 """Steps of the calls that are combined."""
 
@@ -224,4 +226,6 @@ def _said(factor: _Factor, number: Fraction) -> str:
         return f"{factor.text} is left out"
     if number == -1:
         return f"{factor.text} has the opposite sign"
-    return f"{factor.text} is {plain_decimal(number, 8)} times what it should be"
+    near = abs(number - 1) < _NEAR_ONE
+    times = f"1 {'+' if number > 1 else '-'} {decimal_text(abs(number - 1), 2)}" if near else plain_decimal(number, 8)
+    return f"{factor.text} is {times} times what it should be"

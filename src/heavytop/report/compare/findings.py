@@ -19,7 +19,7 @@ from heavytop.display import plural
 from heavytop.integrate.registry import is_third_party
 from heavytop.measure.scalar import digits_kept, digits_text
 from heavytop.measure.scorer import ERRORS, OBSERVED_ORDER, ORDER_OF_RUNS, SOLUTION_ERROR
-from heavytop.records import FAILED, UNMEASURED, UNSUPPORTED, Identity, Law, Metric, Quantity, Row, Series
+from heavytop.records import FAILED, NOT_ASKED, UNMEASURED, UNSUPPORTED, Identity, Law, Metric, Quantity, Row, Series
 from heavytop.report.compare.rows import Finding
 from heavytop.report.compare.verdicts import Verdict
 from heavytop.report.document.document import clip, integral_text, short
@@ -471,6 +471,8 @@ def _fate(change: Change) -> tuple[str, str]:
         return became.get(change.verdict, "cannot be compared"), change.findings[0].reason
     if change.new.outcome == UNSUPPORTED:
         return "are no longer supported", change.new.reference.reason
+    if change.new.outcome == NOT_ASKED and change.verdict is Verdict.INCOMPARABLE:
+        return "are not measured", _why(change.new)
     if change.old is None or change.old.outcome == "success":
         return "failed", _why(change.new)
     return ("stop earlier" if change.verdict is Verdict.WORSE else "failed in both reports"), _why(change.new)
