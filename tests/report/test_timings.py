@@ -173,11 +173,19 @@ def test_the_fastest_run_counts_since_other_work_only_adds() -> None:
     assert judged({"compile": 9.0, "run": 210.0}, alone, **ALWAYS) == ("same", "")
 
 
+def test_seconds_below_the_floor_are_equal_and_the_ratio_said_is_theirs() -> None:
+    floor = {"timings": Timings("always", ratio=2, floor=0.01)}
+    assert judged(PLAIN | {"least": 0.009}, PLAIN | {"least": 0.001}, **floor) == ("same", "")
+    slow = judged(PLAIN | {"least": 0.04}, PLAIN | {"least": 0.001}, **floor)
+    assert slow == ("worse", "seconds run: 40 times as long")
+
+
 def test_seconds_that_are_not_resolved_are_as_many_as_are() -> None:
     quick = SECONDS | {"run": 3e-5, "least": 1.4e-5, "unresolved": 1e-4, "band": 0.4}
     other = quick | {"run": 9e-5, "least": 6e-5}
     assert judged(other, quick) == judged(quick, other) == ("same", "")
     assert judged(SECONDS | {"run": 1.4e-4, "least": 1.2e-4}, quick) == ("same", "")
-    assert judged(SECONDS | {"run": 1.4e-3, "least": 1.2e-3}, quick)[0] == "worse"
+    slower = judged(SECONDS | {"run": 1.4e-3, "least": 1.2e-3}, quick)
+    assert (slower[0], "at least 14 times as long" in slower[1]) == ("worse", True)
     assert judged(quick, SECONDS | {"run": 1.4e-3, "least": 1.2e-3})[0] == "better"
     assert judged(other, quick, **ALWAYS) == ("same", "")

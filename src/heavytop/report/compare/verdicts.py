@@ -186,11 +186,10 @@ def judge_seconds(old: float, new: float, timings: Timings) -> Judged:
     if not (math.isfinite(old) and math.isfinite(new)):
         return Verdict.INCOMPARABLE, "no finite time"
     ratio = max(new, timings.floor) / max(old, timings.floor)
+    slower, faster = (f"{a / b:.2g} times" if b else "many times" for a, b in ((new, old), (old, new)))
     if ratio > timings.ratio:
-        return Verdict.WORSE, f"{ratio:.2g} times as long"
-    if ratio * timings.ratio < 1:
-        return Verdict.BETTER, f"{1 / ratio:.2g} times as fast"
-    return SAME
+        return Verdict.WORSE, f"{slower} as long"
+    return (Verdict.BETTER, f"{faster} as fast") if ratio * timings.ratio < 1 else SAME
 
 
 # Comparison of the seconds of repeated runs on one machine.
@@ -224,20 +223,22 @@ def judge_repeated(
         return
     allowed = max(math.log10(ratio), noise * math.sqrt(2) * (0.0 if resolved[0] else old[BAND]))
     for name in ("run", "least"):
-        yield name, _seconds_verdict(max(old.get(name, 0.0), resolved[0]), max(new[name], resolved[1]), allowed)
+        known = "at least " if old.get(name, 0.0) < resolved[0] or new[name] < resolved[1] else ""
+        yield name, _seconds_verdict(max(old.get(name, 0.0), resolved[0]), max(new[name], resolved[1]), allowed, known)
     if new[BAND] > _WIDEST and not resolved[1]:
         yield BAND, (Verdict.INCOMPARABLE, f"its runs scatter by a factor of {10 ** (2 * new[BAND]):.2g}")
 
 
-def _seconds_verdict(old: float, new: float, allowed: float) -> Judged:
+def _seconds_verdict(old: float, new: float, allowed: float, known: str) -> Judged:
+    """The verdict on seconds by the allowed growth in decades; known: "at least " where one is not resolved."""
     if min(old, new) <= 0:
         return SAME if old == new else (Verdict.INCOMPARABLE, "a run that took no time")
     grown = math.log10(new / old)
     if abs(grown) <= allowed:
         return SAME
     if grown > 0:
-        return Verdict.WORSE, f"{10**grown:.3g} times as long; {10**allowed:.2g} is allowed"
-    return Verdict.BETTER, f"{10**-grown:.3g} times as fast; {10**allowed:.2g} is allowed"
+        return Verdict.WORSE, f"{known}{10**grown:.3g} times as long; {10**allowed:.2g} is allowed"
+    return Verdict.BETTER, f"{known}{10**-grown:.3g} times as fast; {10**allowed:.2g} is allowed"
 
 
 # Outcomes: the comparison of two rows of which at least one did not reach its horizon.
