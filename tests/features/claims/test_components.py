@@ -263,6 +263,17 @@ def test_a_component_without_what_it_needs_is_refused(change: dict[str, Any], me
 
 
 @pytest.mark.slow
+def test_the_integrand_of_a_component_that_starts_at_an_irrational_rate_has_no_sample() -> None:
+    table = {
+        "kind": "component",
+        "top": top("2 2 1", "0 0 1"),
+        "start": {"omega": ["1", "sqrt(2)", "1"], "gamma": ["0", "4/5", "3/5"]},
+        "component": {"quantity": "gamma3", "constants": ["Omega3"]},
+        "quadrature": {"variable": "u", "integrand": "1/sqrt(2 - u^2)"},
+    }
+    assert "give a start that is rational" in open_conditions(audited(table))
+
+
 def test_a_start_that_is_rational_at_no_sample_is_named() -> None:
     report = audit(
         parameters={"C": ["2", "3"]},

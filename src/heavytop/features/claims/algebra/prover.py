@@ -493,7 +493,7 @@ class Prover:
 
     def _why_no_sample(self, statement: Statement) -> str:
         setting = self._setting
-        if not setting.samples:
+        if not (setting.samples and statement.domain.points):
             return "no exact state is known: give a start that is rational at the samples and moves, or states"
         if not any(all(need.is_met(sample) for need in setting.bodies) for sample in setting.samples):
             return "at every sample a principal moment exceeds the sum of the others: no body has such moments"

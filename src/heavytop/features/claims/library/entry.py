@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from heavytop.errors import InputError, invalid, quoted
+from heavytop.errors import InputError, invalid, meant, quoted
 
 FOLDER = Path(__file__).parent
 _REMEDY = "See `heavytop docs library` for the keys of an entry."
@@ -131,5 +131,5 @@ def require_tag(tag: str) -> str:
     """The tag; raises InputError for one that no entry has."""
     known = sorted({tag for entry in library().values() for tag in entry.tags})
     if tag not in known:
-        raise InputError(f"No claim has the tag {quoted(tag)}.", f"Tags: {', '.join(known)}.")
+        raise InputError(f"No claim has the tag {quoted(tag)}.", f"{meant(tag, known)}Tags: {', '.join(known)}.")
     return tag
