@@ -4,8 +4,8 @@ import random
 from fractions import Fraction
 
 from heavytop import HeavyTop, State
-from heavytop.exact.cases.delone import Delone, DeloneHomoclinic
-from support.proofs import assert_attitude, assert_overlap, assert_solves, positive, rational
+from heavytop.exact.cases.delone import Delone
+from support.proofs import positive, rational
 
 TINY = Fraction(1, 10**30)
 
@@ -38,12 +38,3 @@ STARTS = {
 }
 STARTS |= {f"turning point {n}": (*start, (1, 0)) for n, start in enumerate(AZIMUTH)}
 STARTS |= {f"no azimuth, {n}": (*start, (1, 0)) for n, start in enumerate(NONE)}
-
-
-def test_the_limit_of_the_class_is_the_homoclinic_form():
-    special = DeloneHomoclinic(Fraction(3, 2), Fraction(5, 3))
-    general = Delone(special.top, special.start)
-    for time in (Fraction(-7, 3), Fraction(1, 5), Fraction(30)):
-        assert_solves(special, time)
-        assert_overlap(special.state(time, 200), general.state(time, 200))
-    assert_attitude(special, Fraction(1, 3))

@@ -42,7 +42,7 @@ class Family(NamedTuple):
 FAMILIES = {
     "bobylev-steklov": Family("bobylev_steklov", 20, at="motion_from"),
     "delone": Family("delone", 12, at="delone"),
-    "delone, homoclinic": Family("homoclinic", 4, "random_delone"),
+    "delone, homoclinic": Family("homoclinic", 4, "random_delone", at=""),
     "dokshevich": Family("dokshevich", 8, at="motion"),
     "ershkov, partial": Family("homoclinic", 4, "random_partial"),
     "euler": Family("euler", 20, at="euler"),

@@ -8,11 +8,9 @@ from time import process_time
 import pytest
 
 from heavytop.errors import NotInClass, OutOfReach
-from heavytop.exact.cases import goryachev_chaplygin_rest
 from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplygin
 from heavytop.exact.cases.goryachev_chaplygin_rest import GoryachevChaplyginRest
 from heavytop.exact.enclosure.run import Validated
-from heavytop.exact.flint.balls import working_precision
 from heavytop.measure.reference import reference
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_meets, assert_narrow, assert_overlap, assert_solves, positive, rational, triple
@@ -76,22 +74,6 @@ def test_the_enclosure_holds_the_attitude_over_several_rests():
     """The body rests again every 4 K(m)/√a, some 7 units of time."""
     motion = GoryachevChaplyginRest(TOP, State((0, 0, 0), UNIT))
     assert_meets(motion, (F(3), F(8), F(-12)))
-
-
-@pytest.mark.parametrize("make", [from_rest, moving])
-def test_a_motion_goes_back_the_way_that_it_came(make):
-    motion = make(3)
-    with working_precision(300):
-        own = goryachev_chaplygin_rest._motion(motion)
-        whole = 4 * own.functions.quarter / own.size.sqrt()
-        since = 2 * own.origin / own.size.sqrt()
-        for share in (F(1, 3), F(7, 5)):
-            here = own.at(whole * share.numerator / share.denominator - since).state()
-            back = own.at(-whole * share.numerator / share.denominator - since).state()
-            later = own.at(whole * (2 - share).numerator / share.denominator - since).state()
-            for other in (back, later):
-                assert all((a + b).contains(0) for a, b in zip(here[:3], other[:3], strict=True))
-                assert_overlap(here[3:], other[3:])
 
 
 @pytest.mark.parametrize("power", [1, 3, 10, 100, 300])

@@ -14,6 +14,7 @@ from support.helpers import positive
 from support.proofs import assert_overlap
 
 BOTH = [ErshkovPartial(Fraction(3, 4), Fraction(5), Fraction(2)), DeloneHomoclinic(Fraction(3, 4), Fraction(5))]
+STARTS = {known.method: known for known in BOTH}
 
 
 def random_delone(seed):

@@ -7,7 +7,7 @@ import pytest
 from flint import fmpq_mpoly_ctx
 
 from heavytop import HEAVY_GYROSTAT, HeavyTop, State
-from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplygin, Sretensky
+from heavytop.exact.cases.goryachev_chaplygin import Sretensky
 from heavytop.exact.catalogue import find
 from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
 from heavytop.exact.separable.abel import Rest
@@ -67,15 +67,9 @@ def test_it_is_found_under_every_naming_of_the_axes(axes):
     assert_solves(found, F(7, 3))
 
 
-def test_without_a_rotor_it_is_goryachev_and_chaplygins():
-    start = State(("3/4", "1/2", 0), (0, 0, 1))
-    plain = GoryachevChaplygin(HeavyTop((4, 4, 1), 1, (1, 0, 0)), start)
-    motion = motion_from((F(1), F(0)), 0, (F(3, 4), F(1, 2), 0), (0, 0, 1))
-    assert [str(one) for one in plain.state(F(7, 3), 170)] == [str(one) for one in motion.state(F(7, 3), 170)]
-
-
 ALONG_1 = (F(1), F(0))
 STARTS = {
+    "no rotor": (ALONG_1, 0, (F(3, 4), F(1, 2), 0), (0, 0, 1)),
     "turning point": (ALONG_1, 1, (F(3, 4), F(1, 2)), (0, 0, 1)),
     "both at turning points": (ALONG_1, F(-5, 2), (F(1, 3), F(0)), (0, 0, 1)),  # q = γ2 = 0
     "γ along the centre": (ALONG_1, -2, (0, F(1, 2), 0), (1, 0, 0)),
