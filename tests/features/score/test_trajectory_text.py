@@ -57,12 +57,15 @@ def scored(tmp_path: Path, text: str | bytes, name: str = "a.csv", case=CASE):
         table(HEADER, ", ", "%.17E").replace("E", "D"),
         table(HEADER + ",energy", order=(*range(7), 1)),
         table("// t, omega (rad/s)\n" + HEADER) + "\n\n",
+        "#\n# #\n" + table(),
+        table("# t omega1 omega2 omega3 gamma1 gamma2 gamma3\n# Time t in seconds; gyro and wx wy wz in rad/s", "\t"),
+        "# inertia: [[5/2], [5/2], [3/2]]\n# a_w a_x a_y a_z b_w b_x b_y b_z\n" + table(),
         table("t;w1;w2;w3;g1;g2;g3\n(s);rad/s;1/s;[rad/s];-;1;-", ";"),
         "sep=;\n" + table(HEADER.replace(",", ";"), ";"),
         "# weight: 2;;;;\n# centre: 0, 0, 3/4;;;;\n" + table(HEADER.replace(",", ";"), ";").replace(".", ","),
         '# weight: 2,,,,\n"# centre: 0, 0, 3/4",,,,\n# inertia: 5/2,5/2,3/2,,\n' + table("n" + HEADER, ",")[1:],
     ],
-    ids=range(19),
+    ids=range(22),
 )
 def test_a_table_of_another_program_is_read_as_it_was_meant(text: str | bytes, tmp_path: Path) -> None:
     given = scored(tmp_path, text)

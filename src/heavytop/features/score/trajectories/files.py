@@ -82,8 +82,10 @@ def read_table(text: str, started: bool = False) -> tuple[dict[str, Any], list[s
         raise _no_header([])
     separator = _separator(body[0])
     first = _cells(body[0], separator)
-    header = next((names for names in reversed(comments) if _is_header(names, len(first))), None)
-    if not _is_number(first[0]):
+    header: Sequence[str] | None
+    if _is_number(first[0]):
+        header = next((names for names in reversed(comments) if _is_header(names, len(first))), None)
+    else:
         header, body, lines = first, body[1:], lines[1:]
         below = _cells(body[0], separator) if body else []
         if len(below) == len(first) and not _is_number(below[0]) and not any(map(_is_number, {*below} - {"1", "1/s"})):
@@ -165,7 +167,7 @@ def _take_key(comment: str, keys: dict[str, str | list[str]]) -> bool:
         return False
     if key in keys:
         raise InputError(f"The key {key} occurs twice.", "Give each key once.")
-    keys[key] = _numbers(key, value.strip("[]() ")) if key in logs.LISTS else value
+    keys[key] = _numbers(key, re.sub(r"[][()]", " ", value).strip()) if key in logs.LISTS else value
     return True
 
 
@@ -242,8 +244,13 @@ def _is_number(text: str) -> bool:
 
 def _is_header(names: list[str], width: int) -> bool:
     """Whether the words of a comment name the columns, of rows of this width."""
-    header = observed_columns.header(list(dict.fromkeys(names)))  # one that stands twice is refused where it is used
-    has_time = header.time is not None or names[0] == "%time"
+    try:
+        header = observed_columns.header(
+            list(dict.fromkeys(names))
+        )  # one that stands twice is refused where it is used
+    except InputError:  # of a sentence, unless these are as many as the columns
+        return len(names) == width
+    has_time = header.time is not None or names[:1] == ["%time"]
     return len(header.of_state()) == len(COLUMNS) or (
         has_time and bool(header.places) and (not header.others or len(names) == width > 2)
     )
