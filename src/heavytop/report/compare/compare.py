@@ -99,12 +99,14 @@ def compare(
     missing: list[tuple[int, Row]] = []
     motions: list[WorseMotions | None] = []
     changes = Changes()
-    environments = baseline.environment, candidate.environment
-    timed, repeated = _timed(policy, *environments), _same_machine_and_versions(*environments)
+    environments, when = (baseline.environment, candidate.environment), policy.timings.compare
+    same_machine = _agree(*environments, _MACHINE)
+    timed = when == "always" or (when == "same-machine" and same_machine)
+    same_versions = _agree(*environments, _VERSIONS) and _packages(environments[0]) == _packages(environments[1])
     checked = isinstance(baseline, Brief), isinstance(candidate, Brief)
     if isinstance(baseline, Brief) and isinstance(candidate, Brief):
         candidate.rows.twins = baseline.rows
-    rows = RowComparison(policy, kinds, timed, list_same, checked, repeated)
+    rows = RowComparison(policy, kinds, timed, list_same, checked, same_machine and same_versions)
     unmatched = _UnmatchedRows(candidate.rows)
     for row in baseline.rows:
         if (match := unmatched.take(row)) is not None:
@@ -179,19 +181,14 @@ class _UnmatchedRows:
             yield row
 
 
-def _timed(policy: Policy, old: dict[str, Any], new: dict[str, Any]) -> bool:
-    when = policy.timings.compare
-    return when == "always" or (
-        when == "same-machine" and all(name in old and old[name] == new.get(name) for name in _MACHINE)
-    )
+def _agree(old: dict[str, Any], new: dict[str, Any], names: Sequence[str]) -> bool:
+    """Whether two environments have the same entries of these names."""
+    return all(name in old and old[name] == new.get(name) for name in names)
 
 
-def _same_machine_and_versions(old: dict[str, Any], new: dict[str, Any]) -> bool:
-    """Whether processor and versions agree, apart from that of this program, which is being compared."""
-    packages = (environment.get("packages", {}).items() for environment in (old, new))
-    first, second = ({name: version for name, version in entries if name != "heavytop"} for entries in packages)
-    names = (*_MACHINE, *_VERSIONS)
-    return first == second and all(name in old and old[name] == new.get(name) for name in names)
+def _packages(environment: dict[str, Any]) -> dict[str, str]:
+    """The versions of packages apart from this program, which is being compared."""
+    return {name: version for name, version in environment.get("packages", {}).items() if name != "heavytop"}
 
 
 def _differences(old: dict[str, Any], new: dict[str, Any]) -> list[tuple[str, str, str]]:

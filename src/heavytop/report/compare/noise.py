@@ -133,18 +133,18 @@ class Limits(msgspec.Struct, frozen=True):
 
 
 class Lookup:
-    """The limits of each metric under a policy, cached.  usual: those of metrics without a rule."""
+    """The limits of each metric of a row under a policy, cached.  usual: those of metrics without a rule."""
 
     def __init__(self, policy: Policy) -> None:
         self.usual = _limits(Rule(), policy)
         self._rules = [(glob(r.measure), glob(r.case), glob(r.metric), _limits(r, policy)) for r in policy.rule]
         self._known: dict[tuple[str, str, str], Limits] = {}
 
-    def __call__(self, measure: str, case: str, metric: str) -> Limits:
-        """The limits of a metric: those of the first rule that matches it."""
+    def __call__(self, row: Row, metric: str) -> Limits:
+        """The limits of a metric of a row: those of the first rule that matches it."""
         if not self._rules:
             return self.usual
-        key = measure, case, metric
+        key = row.key.kind, row.case, metric
         if key not in self._known:
             matching = (limits for *patterns, limits in self._rules if all(map(re.Pattern.fullmatch, patterns, key)))
             self._known[key] = next(matching, self.usual)

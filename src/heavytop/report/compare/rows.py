@@ -369,15 +369,11 @@ class RowComparison:
     failed: list[Row] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
-        self.lookup = Lookup(self.policy)
+        self.limits = Lookup(self.policy)
 
     def ignores(self, row: Row) -> bool:
         """Whether a rule ignores the whole row: one whose pattern matches every metric."""
         return self.limits(row, "").ignore
-
-    def limits(self, row: Row, metric: str) -> Limits:
-        """The limits of a metric of a row."""
-        return self.lookup(row.key.kind, row.case, metric)
 
     def compare(self, old: Row, new: Row) -> list[Finding]:
         """All findings about a row that both reports have."""
@@ -419,7 +415,7 @@ class RowComparison:
             return None
         if None not in (old.data, new.data) and other_data(old.data, new.data):
             return None
-        judged = judge_outcomes(old, new, self.lookup.usual.duration)
+        judged = judge_outcomes(old, new, self.limits.usual.duration)
         return judged if judged is None or not (why := self._inconsistent(old, new)) else (Verdict.INCOMPARABLE, why)
 
     def _limits(self, pair: RowPair) -> Iterator[Finding]:
@@ -431,7 +427,7 @@ class RowComparison:
                     yield Finding(pair.key, name, judged[0], None, metric.value, judged[1])
 
     def _metrics(self, pair: RowPair) -> list[Finding]:
-        old, new, usual = pair.old, pair.new, self.lookup.usual
+        old, new, usual = pair.old, pair.new, self.limits.usual
         findings = []
         for name, metric in old.metrics.items():
             match, limits = new.metrics.get(name), self.limits(old, name)
@@ -466,7 +462,7 @@ class RowComparison:
 
         Then neither truncation nor step control matter, which :meth:`_metric` considers.
         """
-        before, after, usual = metric.log10, match.log10, self.lookup.usual
+        before, after, usual = metric.log10, match.log10, self.limits.usual
         if before is None or after is None or not metric.kind == match.kind == "error":
             return False
         band, new_band, allowed = metric.band, match.band, usual.truncation

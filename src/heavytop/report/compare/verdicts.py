@@ -111,7 +111,12 @@ def _errors(
         noise = noise if bound.explains(old.quantity, apart(a, b - a)) else STEP_CONTROL
     allowed = max(limits.loss, noise) + _ROUNDED
     if new.value == UNRESOLVED:
-        return _unresolved(old, new, b - a, allowed)
+        # two bounds depend on their references; the floor applies to errors alone
+        moved = abs(size(new) - size(old) if old.value == UNRESOLVED else b - a)
+        if b - a > allowed:
+            return Verdict.INCOMPARABLE, f"unresolved below {new.bound}"
+        far = moved > allowed + _UNRESOLVED
+        return (Verdict.INCOMPARABLE, f"unresolved below {new.bound}, {moved:.1f} decades away") if far else SAME
     if a == b or (old.value == UNRESOLVED and b <= a):
         return SAME
     if math.isinf(a) or math.isinf(b):
@@ -123,17 +128,6 @@ def _errors(
     if loss > 0:
         return Verdict.WORSE, f"{loss / BITS:.1f} bits lost{beyond}"
     return Verdict.BETTER, f"{-loss / BITS:.1f} bits gained{beyond}"
-
-
-def _unresolved(old: Metric, new: Metric, lost: float, allowed: float) -> Judged:
-    """The verdict on an unresolved error.  lost: decades above the floor, from the baseline to the new bound."""
-    if lost > allowed:
-        return Verdict.INCOMPARABLE, f"unresolved below {new.bound}"
-    # two bounds depend on their references; the floor applies to errors alone
-    moved = size(new) - size(old) if old.value == UNRESOLVED else lost
-    if abs(moved) > allowed + _UNRESOLVED:
-        return Verdict.INCOMPARABLE, f"unresolved below {new.bound}, {abs(moved):.1f} decades away"
-    return SAME
 
 
 def beyond_limit(new: Metric, limits: Limits) -> Judged | None:

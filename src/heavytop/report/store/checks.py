@@ -221,7 +221,8 @@ def log_sizes(texts: tuple[str, ...]) -> list[float]:
 
     Cached: several rules that check and compare a row need it of the same series.
     """
-    if not _plain_numbers(texts):
+    joined = "".join(texts)
+    if "_" in joined or not joined.isascii():  # Python accepts these, exact() does not
         return [_floor(log10(exact(text))) for text in texts]
     with suppress(ValueError):
         sizes = list(map(abs, map(float, texts)))
@@ -417,9 +418,3 @@ def _is_plain(metric: Metric) -> bool:
         return abs(math.log10(float(text)) - logarithm) < CLOSE / 2
     except ValueError:
         return False
-
-
-def _plain_numbers(texts: Iterable[str]) -> bool:
-    """Whether :func:`exact` accepts every number in the texts that Python does."""
-    joined = "".join(texts)
-    return joined.isascii() and "_" not in joined
