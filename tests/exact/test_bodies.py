@@ -110,6 +110,14 @@ def test_moments_that_are_nearly_equal_are_told_apart_and_huge_ones_scaled() -> 
         assert max(abs(x) for row in found.left for x in row) <= size / 2**190
 
 
+def test_a_tensor_with_two_negative_moments_has_axes() -> None:
+    """Its determinant is positive, and its trace far below its entries."""
+    size = Fraction(10**29)
+    found = principal_axes([[Fraction(1), size, 0], [size, Fraction(1), 1], [0, 1, Fraction(-3)]], 128)
+    assert [moment < 0 for moment in sorted(found.moments)] == [True, True, False]
+    assert max(abs(x) for row in found.left for x in row) <= size / 2**120
+
+
 def thin(small: Fraction) -> list[list[Fraction]]:
     """A tensor with irrational axes, one moment near 14 and two near ``small``."""
     v, rest = (1, 2, -3), ((2, 1, 0), (1, 3, 1), (0, 1, 5))

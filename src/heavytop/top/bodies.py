@@ -114,7 +114,7 @@ def _spread(tensor: Rows[Fraction]) -> int:
             "Two principal moments of the inertia tensor differ by a factor above 1e300.",
             "Check its entries and their units.",
         )
-    return spread // _GUARD_BITS * _GUARD_BITS
+    return max(0, spread // _GUARD_BITS * _GUARD_BITS)
 
 
 def _less(tensor: Rows[Fraction], moments: Sequence[Fraction]) -> Three[Vector]:
