@@ -214,12 +214,15 @@ def test_what_explains_the_states_comes_first_and_counts_its_rows() -> None:
 
 
 def test_heyoka_beside_a_third_party_integrator_is_a_scale_and_no_verdict() -> None:
-    scale, mine = row(case="lagrange"), rk5(case="lagrange")
-    worse = replace(scale, metrics={**scale.metrics, "drift_energy_max": error("1e-3")})
+    law = Law("t^0.5", 9, 0.5, 0.4, 0.6)
+    scale, mine = row(case="lagrange", laws={"drift_area": law}), rk5(case="lagrange")
+    steeper = replace(law, growth="t", exponent=1.0, low=0.9, high=1.1)
+    worse = replace(scale, metrics={**scale.metrics, "drift_energy_max": error("1e-3")}, laws={"drift_area": steeper})
     for new in (worse, failing(scale), rk5(case="euler")):
         result = compare(report(scale, mine), report(new, mine), Policy())
         assert (result.exit_code, [each.verdict for each in result.changed if each.row.key == scale.key]) == (0, [])
         assert result.sentences[0].startswith("Nothing changed") == (new.case == "lagrange")
+        assert new is not worse or "growth drift_area" in {finding.metric for finding in result.findings}
         assert result.sentences[-1].startswith(
             "heyoka, measured for scale but not judged, changed in 1 row on lagrange"
         )

@@ -9,6 +9,8 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
+from msgspec.structs import replace
+
 from heavytop.errors import ExitCode, InputError
 from heavytop.records import Identity, Row
 from heavytop.report.compare.findings import RANK, Change, Changes, sentences
@@ -127,7 +129,10 @@ def compare(
             new = Finding(row.identity, "", Verdict.NEW, None, row.outcome)
             findings_by_row.append(changes.add(None, row, [new]))
     excused = changes.excused()
-    findings = [finding.as_same() if excused(finding) else finding for finding in chain.from_iterable(findings_by_row)]
+    findings = [
+        replace(finding, verdict=Verdict.SAME, reason="") if excused(finding) else finding
+        for finding in chain.from_iterable(findings_by_row)
+    ]
     if not rows.same and all(finding.verdict is Verdict.NEW for finding in findings):
         raise InputError("There is nothing to compare.", "Compare reports of `heavytop run` that have rows.")
     same = rows.same + sum(finding.verdict is Verdict.SAME for finding in findings)

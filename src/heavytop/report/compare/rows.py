@@ -266,10 +266,6 @@ class Finding(msgspec.Struct, frozen=True, gc=False):
         """The integrator and its format."""
         return self.row.key.subject.name, self.row.key.precision
 
-    def as_same(self) -> Finding:
-        """The finding with the verdict same."""
-        return Finding(self.row, self.name, Verdict.SAME, self.baseline, self.candidate)
-
     @property
     def of_yardstick(self) -> bool:
         """Whether the row is heyoka's, which is measured beside another integrator for scale."""
