@@ -294,6 +294,25 @@ def test_a_gate_without_a_baseline_names_the_command_that_makes_it(tmp_path: Pat
     assert said.endswith(" heavytop gate --plan smoke --baseline 'my base' --bless\n")
 
 
+@pytest.mark.parametrize(
+    ("line", "cause"),
+    [
+        ("--bless --policy nope.toml", "The policy nope.toml cannot be read"),
+        ("--bless --markdown no/folder.md", "no/folder.md cannot be written"),
+        ("--bless --baseline a_file", "a_file is a file"),
+        ("", "report.json was changed since it was written"),
+    ],
+)
+def test_a_gate_refuses_what_it_can_before_it_measures(tmp_path: Path, line: str, cause: str) -> None:
+    (tmp_path / "a_file").write_text("")
+    baseline = tmp_path / ".heavytop" / "baseline"
+    baseline.mkdir(parents=True)
+    (baseline / "report.json").write_text("{}")
+    (baseline / "report.json.sha256").write_text("0")
+    assert cause in refused("gate", "--plan", "smoke", *line.split(), cwd=tmp_path)
+    assert not (tmp_path / ".heavytop" / "new").exists()
+
+
 def test_a_gate_of_no_plan_leaves_the_report_of_before(tmp_path: Path) -> None:
     before = tmp_path / ".heavytop" / "new" / "message.txt"
     before.parent.mkdir(parents=True)

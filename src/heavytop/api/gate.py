@@ -8,19 +8,21 @@ from pathlib import Path
 from heavytop.api.reports import Comparison
 from heavytop.api.run_folder import PAGE, is_written
 from heavytop.errors import InputError
+from heavytop.features.kinds import KINDS
 from heavytop.files import replace, writable
 from heavytop.report.compare.findings import line
 from heavytop.report.document.document import row_name
 from heavytop.report.render.comparison import headline
-from heavytop.report.store.store import FILE
+from heavytop.report.store.store import FILE, read_brief
 
 MESSAGE = "message.txt"
 
 
 def require_baseline(baseline: Path, remedy: str) -> None:
-    """Raise InputError if the folder has no report; remedy: the command that makes it."""
+    """Raise InputError if the folder has no report, or a changed one; remedy: the command that makes it."""
     if not any((baseline / name).exists() for name in (FILE, f"{FILE}.gz")):
         raise InputError(f"{baseline} contains no baseline.", f"Make one, and commit it: {remedy}")
+    read_brief(baseline, KINDS)
 
 
 def clear(folder: Path) -> None:

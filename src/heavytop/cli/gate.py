@@ -44,6 +44,7 @@ def gate(
     from heavytop.api.reports import compared
     from heavytop.api.run_folder import prepare
     from heavytop.harness.plan import former
+    from heavytop.report.compare.noise import load
     from heavytop.report.render.comparison import comparison
 
     trusted, fresh, rules = absolute(baseline), absolute(out), policy_of(plan, policy)
@@ -51,6 +52,13 @@ def gate(
         raise InputError(f"{out} is named twice.", "Give different folders for the new report and the baseline.")
     code = Path(integrator.partition(":")[0]) if integrator else None
     require_apart((markdown, junit, html), baseline, out, rules, Path(plan), code)
+    for file in filter(None, (markdown, junit, html)):  # what can be refused is, before minutes of measuring
+        if not absolute(file).parent.is_dir() and fresh not in absolute(file).parents:
+            raise InputError(f"{file} cannot be written: its folder does not exist.", "Give a file in another folder.")
+    if trusted.is_file():
+        raise InputError(f"{baseline} is a file.", "Give a folder as --baseline.")
+    if rules is not None:
+        load(rules)
     command_line = join(["heavytop", *sys.argv[1:], "--bless"])
 
     def make_room(folder: Path) -> None:

@@ -68,7 +68,10 @@ class Curve(msgspec.Struct, forbid_unknown_fields=True):
     def subjects(self) -> Iterator[Subject]:
         """The subject of each point; raises InputError for an impossible value."""
         if not self.tolerances and not self.steps:
-            raise InputError(f"The list of points of {self.integrator} is empty.", "Give it tolerances, or steps.")
+            raise InputError(
+                f"The list of points of {self.integrator} is empty.",
+                'Give it steps or tolerances; ["eps"] where nothing sets it.',
+            )
         for text in self.steps:
             if text != FINEST and physical(text, "step") <= 0:
                 raise InputError(f"steps must be positive; got {text[:60]!r}.", "Give positive numbers.")
