@@ -7,16 +7,19 @@ from pathlib import Path
 import pytest
 
 import heavytop as ht
+from heavytop.errors import InputError
 from heavytop.features.hunt.measured import FAMILIES, MOST_TURNS, Meter, drawn, possible, turns
 from heavytop.features.hunt.search import digits, keep, kept
 from heavytop.features.kinds import KINDS
 from heavytop.harness.checkpoint import Saved
 from heavytop.integrate.registry import INTEGRATORS, Integrator, described
 from heavytop.precision import exact
+from heavytop.report.store.checks import check_rows
 from heavytop.top.amplification import amplification
 from heavytop.top.equations import HEAVY_TOP
 from support.in_process import heavytop
 from support.reports import tasks_of
+from support.small_reports import row
 
 NUMBERS = ("inertia", "centre", "omega", "gamma")
 
@@ -123,6 +126,12 @@ def test_error_and_amplification_are_those_of_the_scorer_and_the_variational_equ
         parameters = HEAVY_TOP.parameters(top, start)
         whole = amplification(HEAVY_TOP, parameters, start.flat, Fraction(10))
         assert whole / 10 < found.amplification < whole * 3
+
+
+def test_a_row_without_its_largest_error_is_refused() -> None:
+    empty = row(measure="hunt", metrics={})
+    with pytest.raises(InputError, match="a row of hunt without hunt_error_relative_to_law_max"):
+        check_rows(Path("report.json"), [empty], KINDS)
 
 
 @pytest.mark.slow

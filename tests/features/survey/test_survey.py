@@ -3,6 +3,7 @@
 import json
 import math
 from fractions import Fraction
+from functools import reduce
 from itertools import chain
 from pathlib import Path
 from random import Random as Dice
@@ -271,6 +272,32 @@ def _surveyed(folder: Path, fault: float = 0.0, places: tuple[int, ...] = ()) ->
 @pytest.fixture(scope="module")
 def healthy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return _surveyed(tmp_path_factory.mktemp("surveys") / "healthy")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("path", "value", "said"),
+    [
+        (("spread",), None, "spread: missing"),
+        (("spread", "histograms", "error_max", "counts"), [], "a distribution of no motions"),
+        (("spread", "map", "x_edges"), [], "whose cells do not fit its edges"),
+        (("spread", "map", "digits_lost"), [], "whose cells do not fit its edges"),
+        (("worst", 0, "data", "gamma"), ["0", "1"], "worst: 2 components of gamma"),
+    ],
+)
+def test_distributions_and_worst_motions_that_no_survey_has_are_refused(
+    healthy: Path, tmp_path: Path, path: tuple[str | int, ...], value: object, said: str
+) -> None:
+    document = json.loads((healthy / "report.json").read_text())
+    *inner, last = path
+    part = reduce(lambda found, key: found[key], inner, document["rows"][0])
+    if value is None:
+        del part[last]
+    else:
+        part[last] = value
+    (tmp_path / "report.json").write_text(json.dumps(document))
+    with pytest.raises(InputError, match=said):
+        ht.read_report(tmp_path)
 
 
 @pytest.mark.slow

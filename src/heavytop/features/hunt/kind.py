@@ -72,6 +72,7 @@ class HuntKind(Kind):
     name = NAME
     table = HuntTable
     place = 35
+    needed = (WORST.text,)
 
     def cost(self, task: Task) -> float:
         """About 10 ms per motion."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
+from itertools import chain
 from pathlib import Path
 
 import msgspec
@@ -26,6 +27,7 @@ from heavytop.precision import DOUBLE, EXTENDED, exact, parse, rounded
 from heavytop.records import HEYOKA, Against, Beside, Metric, Row, Spread
 from heavytop.report.document.document import Block, Card, Chart, Headline, In, Note, short
 from heavytop.report.document.motions import LossLimits, WorseMotions
+from heavytop.report.store.checks import impossible
 
 NAME = "survey"
 _SWEEP = "sweep:"
@@ -113,6 +115,23 @@ class Survey(Kind):
         """A row for each sweep and integrator; the records of all motions go into survey.parquet."""
         write(folder / FILE, (row.chunk for _, row in rows() if isinstance(row.chunk, bytes)))
         return gathered(rows())
+
+    def contradictions(self, row: Row) -> Iterator[str]:
+        """Distributions, a map and worst motions that no survey has.  The row of a chunk has none of these."""
+        if not isinstance(row.spread, Spread):
+            if not isinstance(row.chunk, bytes):
+                yield "spread: missing"
+            return
+        if not all(map(sum, (bins.counts for bins in row.spread.histograms.values()))):
+            yield "spread: a distribution of no motions"
+        if (cells := row.spread.map) is not None:
+            widths = [len(line) for line in cells.digits_lost]
+            fits = widths == [len(cells.x_edges) - 1] * (len(cells.y_edges) - 1)
+            if not fits or set(chain(*cells.digits_lost)) <= {None}:
+                yield "spread: a map whose cells do not fit its edges, or are empty"
+        for motion in row.worst or ():
+            if reason := impossible(motion.data, 1):
+                yield f"worst: {reason}"
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
         """The median and the worst error of all motions; a line a row."""
