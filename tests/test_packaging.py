@@ -1,5 +1,6 @@
 """What a fresh machine installs: everything pinned, with hashes and without addresses; two commands in the README."""
 
+import os
 import re
 import shutil
 import subprocess
@@ -10,6 +11,8 @@ import zipfile
 from pathlib import Path
 
 import pytest
+
+from heavytop import version
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
@@ -105,3 +108,20 @@ def test_a_wheel_records_its_commit_also_by_way_of_an_sdist(tmp_path: Path) -> N
     (clean / "README.md").write_text("changed")
     dirty = clean.rename(tmp_path / "dirty")
     assert recorded(build(dirty, "wheel")) == f"{commit}-dirty"
+
+
+def test_the_commit_of_a_checkout_is_read_without_a_lock(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    module = tmp_path / "src" / "heavytop" / "version.py"
+    module.parent.mkdir(parents=True)
+    for file in (module, tmp_path / "pyproject.toml"):
+        file.write_text("")
+    git(tmp_path, "init", "--quiet")
+    git(tmp_path, "add", ".")
+    git(tmp_path, "commit", "--quiet", "--message", "all")
+    os.utime(module, (1, 1))  # git would note the new time in its index
+    index = (tmp_path / ".git" / "index").read_bytes()
+    monkeypatch.setattr(version, "__file__", str(module))
+    assert version.commit() == git(tmp_path, "rev-parse", "HEAD")
+    assert (tmp_path / ".git" / "index").read_bytes() == index
+    module.write_text("changed")
+    assert version.commit() == git(tmp_path, "rev-parse", "HEAD") + "-dirty"

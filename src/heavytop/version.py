@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 from importlib import metadata
 from pathlib import Path
@@ -34,7 +35,9 @@ def _of_checkout() -> str | None:
         return None  # an installed copy may lie inside somebody else's repository
     try:
         completed = subprocess.run(
-            ["git", "-C", str(here), "describe", "--always", "--dirty", "--abbrev=40", "--match="],
+            # without a lock, which a run that is killed would leave behind
+            ["git", "--no-optional-locks", "status", "--porcelain=v2", "--branch", "--untracked-files=no"],
+            cwd=here,
             capture_output=True,
             text=True,
             timeout=5,
@@ -42,4 +45,7 @@ def _of_checkout() -> str | None:
         )
     except (OSError, subprocess.TimeoutExpired):
         return None
-    return completed.stdout.strip() if completed.returncode == 0 else None
+    found = re.search(r"^# branch\.oid ([0-9a-f]{40,})$", completed.stdout, re.M)
+    if completed.returncode or found is None:
+        return None
+    return found[1] + ("" if re.search(r"^[^#]", completed.stdout, re.M) is None else "-dirty")
