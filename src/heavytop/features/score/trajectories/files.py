@@ -218,7 +218,7 @@ def unread(names: Sequence[str], header: Sequence[str]) -> list[str]:
 
 def _no_header(missing: list[str], names: Sequence[str] = ()) -> InputError:
     among = f" among {', '.join(name[:20] for name in names[:9])}" if names else ""
-    said = f": {', '.join(missing)} not found{among}" if missing else ": the file has only comments"
+    said = f": {', '.join(missing)} not found{among}" if missing else ": the file has no rows"
     return InputError(f"The header is not {','.join(COLUMNS)}{said}.", f"{logs.NAMES} {REMEDY}")
 
 
