@@ -55,7 +55,7 @@ IN_SOLVE = {
     "yield [0.0] * 6": "returned a generator instead of Solution",
     "return right(given).states": "returned a list instead of Solution",
     "return Solved((x for x in right(given).states), 2.0, 5)": "returned states of object",
-    "return Solved([[0.0] * 5] * 2, 2.0, 5)": "of the shape (2, 5) for 2 times",
+    "return Solved([[0.0] * 5] * 2, 2.0, 5)": "of the shape (2, 5) for 2 times where states have 6 numbers, Ω and γ",
     "return Solved(numpy.zeros((6, 2)), 2.0, 5)": "of the shape (6, 2) for 2 times",
     "return Solved(right(given).states[:1], 2.0, 5)": "returned 1 of 2 states",
     "return Solved(numpy.ones((2, 6), bool), 2.0, 5)": "returned states of bool",

@@ -136,7 +136,8 @@ def test_an_attitude_that_is_lost_later_is_seen(tmp_path: Path) -> None:
 
 
 def test_a_function_that_a_file_does_not_have_is_no_violation(tmp_path: Path) -> None:
-    (tmp_path / "mine.py").write_text("def solve(request): pass\n")
+    made = "from heavytop.integrate.peers.double import double_peer\nm = double_peer('it', 4, solve)\n"
+    (tmp_path / "mine.py").write_text(f"def solve(request): pass\n{made}")
     solve = named(f"{tmp_path}/mine.py:solv")
-    with pytest.raises(NoSuchFunction, match=r"does not define solv\.\n  Did you mean solve\? It defines solve\."):
+    with pytest.raises(NoSuchFunction, match=r"does not define solv\.\n  Did you mean solve\? It defines solve, m\."):
         integrator_check._judged("start", solve.load)

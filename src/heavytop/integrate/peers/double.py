@@ -14,6 +14,7 @@ from typing import Any, Literal
 import numpy
 
 from heavytop import precision as vectors
+from heavytop.display import plural
 from heavytop.errors import InputError, PeerFailed, Unsupported, quoted, refusal
 from heavytop.integrate.peers.contract import (
     DEFAULT_STEP,
@@ -30,7 +31,7 @@ from heavytop.top.attitude import matrix_of_quaternion
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State, check_times
 
-_WIDE = {7: "Ω and a quaternion", 9: "Ω, γ and ξ"}
+_WIDE = {6: "Ω and γ", 7: "Ω and a quaternion", 9: "Ω, γ and ξ"}
 FINEST = Fraction(1, 10**15)
 """The default tolerance of a peer: below about 4 eps most refuse."""
 
@@ -284,8 +285,10 @@ def _states(name: str, returned: Any, count: int, width: int) -> Any:
     if states.dtype.kind not in "fiu":
         raise PeerFailed(f"{name} returned states of {states.dtype}, not numbers of double")
     if states.ndim != 2 or states.shape[1] != width or len(states) > count:
-        why = f" where states have {width} numbers, {_WIDE[width]}" if width in _WIDE else ""
-        raise PeerFailed(f"{name} returned states of the shape {states.shape} for {count} times{why}")
+        raise PeerFailed(
+            f"{name} returned states of the shape {states.shape} for {plural(count, 'time')} where states have {width} "
+            f"numbers, {_WIDE[width]}"
+        )
     return states.astype(float)
 
 

@@ -43,8 +43,9 @@ class PythonFile:
         try:
             call = attrgetter(self.function)(module)
         except AttributeError:
-            functions = (item for item in vars(module).values() if inspect.isfunction(item))
-            defined = [item.__name__ for item in functions if item.__module__ == module.__name__]
+            functions = {name: item for name, item in vars(module).items() if inspect.isfunction(item)}
+            own = (name for name, item in functions.items() if item.__module__ == module.__name__)
+            defined = [*own, *(name for name, item in functions.items() if hasattr(item, "integrator_name"))]
             remedy = f"{meant(self.function, defined)}It defines {', '.join(defined) or 'no function'}."
             raise NoSuchFunction(f"{self.path} does not define {self.function}.", remedy) from None
         return as_peer(call, self.name)
