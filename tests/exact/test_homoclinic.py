@@ -8,7 +8,7 @@ import pytest
 from heavytop.errors import NotInClass
 from heavytop.exact.cases.delone import DeloneHomoclinic
 from heavytop.exact.cases.ershkov_partial import ErshkovPartial, hyperbolic_angles
-from heavytop.exact.flint.balls import FUNCTIONS, ball, midpoint, working_precision
+from heavytop.exact.flint.balls import FUNCTIONS, ball, working_precision
 from heavytop.top.attitude import attitude_from_angles, gamma_from_angles, perpendicular
 from support.helpers import positive
 from support.proofs import assert_overlap
@@ -37,15 +37,6 @@ def test_angles_and_attitude_agree_with_the_state_on_both_sides_of_the_pole(know
             xi = attitude_from_angles(phi, theta, psi, FUNCTIONS)
         assert_overlap(gamma, state[3:])
         assert_overlap(xi, known.attitude(time, 150))
-
-
-@pytest.mark.parametrize("known", BOTH)
-def test_the_start_is_the_state_at_0_and_the_end_is_the_saddle(known) -> None:
-    assert [midpoint(v) for v in known.state(Fraction(0), 100)] == list(known.start.flat)
-    assert known.start.require_unit_gamma()
-    saddle = (0, known.alpha, 0, 0, 1, 0)
-    for value, limit in zip(known.state(Fraction(300), 100), saddle, strict=True):
-        assert abs(midpoint(value) - limit) < Fraction(1, 10**30)
 
 
 def test_the_angles_of_the_partial_case_keep_their_digits_at_both_ends() -> None:
