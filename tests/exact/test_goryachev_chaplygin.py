@@ -7,10 +7,9 @@ import pytest
 
 from heavytop.errors import NotInClass
 from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplygin
-from heavytop.exact.separable.abel import Rest
 from heavytop.measure.reference import reference
 from heavytop.top.heavy_top import HeavyTop, State
-from support.proofs import assert_every_digit, assert_narrow, assert_solves, positive, rational
+from support.proofs import assert_narrow, assert_solves, positive, rational
 
 F = Fraction
 UP = (F(0), F(0), F(1))
@@ -37,25 +36,16 @@ STARTS = {
     "level, up": (ALONG_1, (1, 0, 3), (0, 1, 0)),
     "level, down": (ALONG_1, (1, 0, -3), (0, 1, 0)),
     "any": (ALONG_1, ("1/2", 0, "-1/2"), ("1/4", "1/3", 1)),
+    "no azimuth, asymptotic": (ALONG_1, (F(-8, 5), 4, F(-24, 5)), (F(-3, 5), 0, F(4, 5))),
+    "no azimuth, another": (ALONG_1, (F(81, 230), F(13, 23), F(-216, 115)), (F(4, 5), 0, F(3, 5))),
+    "no azimuth, a third": (ALONG_1, (F(486, 793), F(24, 61), F(810, 793)), (F(-5, 13), 0, F(12, 13))),
+    **{
+        f"one variable at rest, {s}": (ALONG_1, (F(-18, 13) * s, 0, F(-30, 13) * s), (F(-5, 13), 0, F(12, 13)))
+        for s in (1, -1)
+    },
     # G = 0: u = 0 is a root of both factors
     **{f"double root outside, {n}": (ALONG_1, (0, n, 0), (F(4, 5), 0, F(3, 5))) for n in (-3, -1, 2, F(3, 2))},
 }
-
-
-@pytest.mark.parametrize(
-    ("omega", "gamma", "resting"),
-    [
-        ((F(-8, 5), 4, F(-24, 5)), (F(-3, 5), 0, F(4, 5)), None),
-        ((F(81, 230), F(13, 23), F(-216, 115)), (F(4, 5), 0, F(3, 5)), None),
-        ((F(486, 793), F(24, 61), F(810, 793)), (F(-5, 13), 0, F(12, 13)), None),
-        *((((F(-18, 13) * s, 0, F(-30, 13) * s)), (F(-5, 13), 0, F(12, 13)), (1 - s) // 2) for s in (1, -1)),
-    ],
-)
-def test_asymptotic_motions_and_a_variable_at_rest_are_motions_like_any_other(omega, gamma, resting):
-    motion = motion_from(ALONG_1, omega, gamma)
-    assert_every_digit(motion, F(7, 3), F(-40), F(10**6))
-    for form in motion.made.values():
-        assert resting is None or isinstance(form.line.variables[resting], Rest)
 
 
 @pytest.mark.slow

@@ -11,9 +11,8 @@ from heavytop.exact.cases.kovalevskaya import AbelMotion, Kovalevskaya, _fourth_
 from heavytop.exact.cases.kovalevskaya_theta import ORDERS, KovalevskayaLevel, ThetaMotion, start_of
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import Undecided, ball, midpoint, series_length, working_precision
-from heavytop.exact.separable.abel import Rest
 from heavytop.top.heavy_top import HeavyTop, State
-from support.proofs import assert_every_digit, assert_narrow, assert_overlap, assert_solves, positive, rational, triple
+from support.proofs import assert_narrow, assert_overlap, assert_solves, positive, rational, triple
 
 F = Fraction
 UP = (F(0), F(0), F(1))
@@ -72,6 +71,10 @@ STARTS = {
         "asymptotic": ((-1, F(1, 4), F(1, 4)), UP),
         "asymptotic, tilted": ((F(1, 3), F(1, 6), 1), OTHER),
         "asymptotic, third": ((-1, F(5, 6), F(-1, 3)), OTHER),
+        "no azimuth, w2 at rest": ((F(-7, 6), F(-5, 6), -1), OTHER),
+        "no azimuth, w2 at rest, level": ((F(-1, 2), 0, F(-4, 3)), (F(3, 5), 0, F(4, 5))),
+        "no azimuth, w1 at rest": ((F(-7, 6), F(5, 6), F(-1, 6)), OTHER),
+        "no azimuth, w1 at rest, up": ((0, F(-4, 3), 0), UP),
         **{f"near a degenerate level, {name}, 1e-{n}": (NEAR[name], tilted(n)) for name in NEAR for n in (1, 3)},
     }.items()
 }
@@ -154,24 +157,6 @@ def test_the_exponent_of_an_asymptotic_motion_is_that_of_its_enclosure():
     assert (logarithms[0] - logarithms[1]) / 32 == pytest.approx(exponent, rel=0.1)
     with pytest.raises(NotInClass, match="not asymptotic"):
         random_motion(1).exponent(60)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("omega", "gamma", "resting"),
-    [
-        ((F(-7, 6), F(-5, 6), -1), OTHER, 1),
-        ((F(-1, 2), 0, F(-4, 3)), (F(3, 5), 0, F(4, 5)), 1),
-        ((F(-7, 6), F(5, 6), F(-1, 6)), OTHER, 0),
-        ((0, F(-4, 3), 0), UP, 0),
-    ],
-)
-def test_a_variable_may_rest_at_a_double_root(omega, gamma, resting):
-    motion = motion_from(ALONG_1, omega, gamma)
-    assert_every_digit(motion, F(7, 3), F(-40), F(10**6))
-    for form in motion.made.values():
-        assert isinstance(form.line.variables[resting], Rest)
-    assert_overlap(motion.state(F(5), 180), Validated(motion.top, motion.start).state(F(5), 180))
 
 
 @pytest.mark.slow
