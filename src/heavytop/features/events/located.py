@@ -9,6 +9,7 @@ time.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -212,13 +213,16 @@ class _Sampler:
         assert self.function.call is not None
         try:
             value = self.function.call(state[:3], state[3:])
-            finite = bool(numpy.isfinite(value))
         except Exception as error:
             raise InputError(
                 f"The function {quoted(self.function.name)} raised {type(error).__name__} at the state "
                 f"({', '.join(str(v) for v in state)}): {quoted(str(error))}.",
                 "It is called with Ω and γ, arrays of three numbers of the format, and gives one number.",
             ) from None
+        finite = False
+        with suppress(TypeError, ValueError):  # not a number, or several
+            several = isinstance(value, list | tuple) or numpy.iscomplexobj(value)
+            finite = not several and bool(numpy.isfinite(value))
         if not finite:
             raise InputError(
                 f"The function {quoted(self.function.name)} gave {quoted(value)} at the state "
