@@ -74,6 +74,14 @@ def all_errors_excused_by_bands(row: Document, random: Random) -> bool:
     return bool(metrics)
 
 
+def error_excused_by_a_bound(row: Document, random: Random) -> bool:
+    metric = _pick(row, random, _numbers("error"))
+    if metric:
+        metric["bound"] = metric["value"]
+        _set(metric, exact(metric["value"]) * LARGER)
+    return bool(metric)
+
+
 def band_wider(row: Document, random: Random) -> bool:
     metric = _pick(row, random, lambda _, metric: metric["band"])
     if metric:
@@ -449,8 +457,8 @@ def _next_class(law: Document, random: Random) -> None:
 EDITS: dict[str, Edit] = {
     edit.__name__.replace("_", " "): edit
     for edit in (
-        error_larger, error_excused_by_a_band, all_errors_excused_by_bands, band_wider, band_removed,
-        band_where_none_is_measured, unresolved, no_number, kind_flipped, log10_alone, duration_shorter,
+        error_larger, error_excused_by_a_band, all_errors_excused_by_bands, error_excused_by_a_bound, band_wider,
+        band_removed, band_where_none_is_measured, unresolved, no_number, kind_flipped, log10_alone, duration_shorter,
         value_changed, verdict_turned, metric_dropped, series_dropped, law_dropped, series_shorter, series_larger,
         series_without_its_end, not_finite_hidden, outcome, not_finite, horizon_shorter, reached_less, no_steps,
         more_steps, more_evaluations, bits, precision, starts_fewer, samples_fewer, start_failed, flags, order,
