@@ -11,7 +11,7 @@ import pytest
 from rich.console import Console
 
 from heavytop.errors import InputError
-from heavytop.features.claims.audit.audit import claim_from_table, read_claim
+from heavytop.features.claims.audit.audit import answer, claim_from_table, read_claim
 from heavytop.features.claims.audit.guard import in_time
 from heavytop.features.claims.audit.judge import Audit
 from heavytop.features.claims.text import audit_text
@@ -159,6 +159,28 @@ def test_a_wrong_key_is_named_in_words(parts, said):
     with pytest.raises(InputError, match=said) as caught:
         claim_from_table(({"name": "x"} if "id" not in parts else {}) | claim | parts, "x")
     assert "\x1b" not in str(caught.value)
+
+
+NINES = "8" + "9" * 60  # SymPy's sqrt raises ValueError
+
+
+def test_a_number_whose_root_sympy_refuses_is_an_error_in_words(tmp_path):
+    (path := tmp_path / "claim.toml").write_text(f"""name = "x"
+kind = "integral"
+top = {{ inertia = ["2", "2", "1"], weight = "1", centre = ["0", "0", "1"] }}
+integral = {{ value = "Omega3*sqrt({NINES})" }}""")
+    cause, remedy = answer(str(path), "")
+    assert "SymPy cannot take the root of a number of the claim" in cause
+    table = integral("Omega3*sqrt(k)", top("2 2 1", "0 0 1"), assume=["k > 0"], parameters={"k": NINES})
+    assert "as a parameter" in remedy
+    assert audited(table).verdict == "holds"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("length", "verdict"), [("1e30", "refuted"), ("1e300", "undecided")])
+def test_samples_of_many_digits_are_searched_up_to_a_length(length, verdict):
+    claim = integral("Omega1^2 - Omega2^2 - c*gamma1", top("2 2 1", "c 0 0"), kind="relation", parameters={"c": length})
+    assert audited(claim).verdict == verdict
 
 
 def test_the_name_and_the_source_of_a_claim_are_printed_without_control_characters():

@@ -294,4 +294,9 @@ def answer(path: str, system_name: str) -> Answer:
         error = too_deep(path)
     except HeavyTopError as raised:
         error = raised
+    except ValueError as raised:
+        if "is not a prime factor of" not in str(raised):
+            raise
+        cause = f"{path}: SymPy cannot take the root of a number of the claim: {quoted(str(raised))[1:-1]}."
+        error = InputError(cause, "Give the number under the root as a parameter.")
     return error.cause.encode(errors="replace").decode(), error.remedy  # a path may hold bytes that are no characters

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
@@ -315,6 +316,7 @@ _VALUES = tuple(sympy.Rational(*pair) for pair in ((2, 3), (1, 3), (4, 5), (3, 5
 _SCALES = (1, -1, 1, -1, 20, -20)
 _MOST_STEPS = 300
 _MOST_STATES = 24
+_MOST_BITS = 600
 
 
 def states_on(
@@ -333,6 +335,10 @@ def states_on(
         sympy.numer(sympy.together(condition.subs(numbers, simultaneous=True).replace(sympy.sin, lambda u: u)))
         for condition in conditions
     ]
+    # SymPy takes minutes to factor polynomials with longer numbers
+    sizes = (max(abs(n.p), n.q).bit_length() for e in equations for n in e.atoms(sympy.Rational))
+    if max(sizes, default=0) > _MOST_BITS:
+        return
     if all(is_small_polynomial(equation) and equation.free_symbols <= set(variables) for equation in equations):
         # the only rational states on conditions with irrational numbers may be those where these have the factor 0
         is_rational = all(c.is_Rational for e in equations for c in sympy.Poly(e, *variables).coeffs())
@@ -378,8 +384,9 @@ class _Search:
             if solved := self._linear([factor]):
                 yield (*solved, 0)
             elif len(symbols) == 1:
-                roots = sympy.roots(factor, symbols[0], filter=self._numbers, cubics=False, quartics=False)
-                yield from ((symbols[0], root, 0) for root in roots)
+                with suppress(ValueError):  # SymPy cannot take the root of some numbers of dozens of digits
+                    roots = sympy.roots(factor, symbols[0], filter=self._numbers, cubics=False, quartics=False)
+                    yield from ((symbols[0], root, 0) for root in roots)
             else:
                 # the variable of the highest power gets a value first, which leaves the simplest equation
                 x = max(symbols, key=lambda symbol: (sympy.degree(factor, symbol), str(symbol)))
