@@ -394,6 +394,8 @@ def test_stamps_of_a_start_that_is_given_are_counted_from_it(tmp_path: Path) -> 
     of_px4 = said.replace("stamp.sec,stamp.nanosec", "timestamp [us]")
     path.write_text(of_px4 + "\n".join(f"{10**5 * k},{lines[k]}" for k in range(1, len(lines))))
     assert digits(path) > 13
+    # the clock of a computer that began 112 s before the start
+    assert digits(path, of_px4 + "\n".join(f"{112_345_678 + 10**5 * k},{line}" for k, line in enumerate(lines))) > 13
     for first, begin in ((0, 1), (15 * 10**8, 0)):
         stamps = [f"{first + int(time)},{round(time % 1 * 10**9)}" for time in TIMES]
         path.write_text(said + "\n".join(map(",".join, [*zip(stamps, lines, strict=True)][begin:])))

@@ -60,7 +60,7 @@ def scored(tmp_path: Path, text: str | bytes, name: str = "a.csv", case=CASE):
         "#\n# #\n" + table(),
         table("# t omega1 omega2 omega3 gamma1 gamma2 gamma3\n# Time t in seconds; gyro and wx wy wz in rad/s", "\t"),
         "# inertia: [[5/2], [5/2], [3/2]]\n# a_w a_x a_y a_z b_w b_x b_y b_z\n" + table(),
-        table("t;w1;w2;w3;g1;g2;g3\n(s);rad/s;1/s;[rad/s];-;1;-", ";"),
+        table("t;w1;w2;w3;g1;g2;g3\n(s);rad/s;1/s;[rad/s];-;1;", ";"),
         "sep=;\n" + table(HEADER.replace(",", ";"), ";"),
         "# weight: 2;;;;\n# centre: 0, 0, 3/4;;;;\n" + table(HEADER.replace(",", ";"), ";").replace(".", ","),
         '# weight: 2,,,,\n"# centre: 0, 0, 3/4",,,,\n# inertia: 5/2,5/2,3/2,,\n' + table("n" + HEADER, ",")[1:],

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -88,8 +89,12 @@ def read_table(text: str, started: bool = False) -> tuple[dict[str, Any], list[s
     else:
         header, body, lines = first, body[1:], lines[1:]
         below = _cells(body[0], separator) if body else []
-        if len(below) == len(first) and not _is_number(below[0]) and not any(map(_is_number, {*below} - {"1", "1/s"})):
-            header = [f"{name} [{unit.strip('[]()')}]" for name, unit in zip(first, below, strict=True)]
+        if (
+            1 < len(below) <= len(first)
+            and not _is_number(below[0])
+            and not any(map(_is_number, {*below} - {"1", "1/s"}))
+        ):
+            header = [f"{name} [{unit.strip('[]()')}]" for name, unit in zip_longest(first, below, fillvalue="")]
             body, lines = body[1:], lines[1:]
     names, notes = _without_header(first) if header is None else (header, [])
     if not body:

@@ -127,8 +127,6 @@ def require_understood(names: Sequence[str], others: Sequence[str], quantities: 
             )
 
 
-_TEN_DAYS = 864_000
-_PER_SECOND = {"ms": 10**3, "us": 10**6, "ns": 10**9}
 _OF_1970 = 10**9, 4 * 10**9
 """Seconds since 1970 in the years 2001 to 2096: no motion begins so long before its first row."""
 _LONG = 500
@@ -140,7 +138,8 @@ def with_one_time(
 ) -> tuple[list[str], list[list[str]], list[str]]:
     """Names, cells and a note: stamps of seconds and nanoseconds are one column t; epochs begin at their first row.
 
-    started: the attitude at t = 0 is given, from which stamps of less than ten days are counted.
+    started: the attitude at t = 0 is given, from which stamps are counted, unless the first is beyond the length of the
+    log: then the clock began with the computer.
     """
     names = list(names)
     parts = {
@@ -174,8 +173,8 @@ def with_one_time(
     if names[index] == "t" and second and second - first >= _LONG and first.denominator == second.denominator == 1:
         apart = f"The column {plain[index]} has integers {decimal_text(second - first, 12)} apart, and no unit."
         raise InputError(apart, f"Name the column {plain[index]} [us], [ms] or [ns], or [s] for seconds.")
-    unit = names[index][1:].strip(" []()")
-    if first == 0 or (started and abs(first) < _TEN_DAYS * _PER_SECOND.get(unit[:2], 1)):
+    last = number(cells[-1][index]) if len(cells) > 1 else Fraction(0)
+    if first == 0 or (started and last is not None and abs(first) <= abs(last - first)):
         return names, cells, []
     note = f"times are counted from the first row, {decimal_text(first, 20)}{_kept([row[index] for row in cells])}"
     for row in cells:
