@@ -6,7 +6,7 @@ from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
 from heavytop.records import Against, Explained, Law, Row, Subject
 from heavytop.report.compare.findings import MOST
-from heavytop.report.compare.noise import Policy, Timings
+from heavytop.report.compare.noise import Policy, Rule, Timings
 from heavytop.report.render.history import cells
 from support.report_helpers import error
 from support.reports import compare, history, replace
@@ -92,6 +92,14 @@ def test_rising_errors_and_nearly_equal_steps_show_no_order(counts: tuple[int, i
         [work(n, size) for n, size in zip(counts, ("1e-9", end), strict=True)] for end in ("2e-9", "1e-7")
     )
     assert not any("Order observed" in said for said in found(healthy, faulty))
+
+
+def test_a_limit_alone_is_named_and_is_no_loss_of_order() -> None:
+    rows = [work(n, f"1e-{4 * i}", drift=f"1e-{4 * i}") for i, n in enumerate((10, 100, 1000), 1)]
+    policy = Policy(rule=(Rule(metric="drift_*", limit="1e-9"),))
+    said = compare(report(*rows), report(*rows), policy).sentences
+    assert said[0].startswith("Drift of the energy 1e-4 → 1e-4 on euler up to T = 100 (mine:rk5, step 1/10, double)")
+    assert said[0].endswith(", above its limit; also on 1 other row.")
 
 
 def test_rows_of_two_versions_are_one_row_and_both_versions_are_said() -> None:

@@ -38,6 +38,8 @@ _ENDS_AS_BEFORE = 0.5
 """Decades by which the error of the last state may grow where only the dense output is worse."""
 _STEPS_MOVED = 0.02
 """Decades: different roundings in step size control change the steps by less."""
+_LEAST_LOSS = math.log10(1.1)
+"""Decades: a smaller loss is no loss of order, where only the limit of a policy makes an error worse."""
 _LESS = 0.5
 """Largest loss at coarser settings, as a fraction of that at the finest, for a new error of lower order."""
 _LOWER_ORDER = (
@@ -211,10 +213,8 @@ class Changes:
             return ""
         finest = max(steps for (steps, _), _ in points)
         losses = {math.log10(change.old.steps): change.largest_loss for change in changed if change.old}
-        if finest not in losses:
-            return ""
-        largest = losses.pop(finest)
-        if any(loss > _LESS * largest for loss in losses.values()):
+        largest = losses.pop(finest, 0.0)
+        if largest < _LEAST_LOSS or any(loss > _LESS * largest for loss in losses.values()):
             return ""
         return "lost less" if losses else "are the same"
 
@@ -564,7 +564,8 @@ def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdic
         values = f" {short(finding.baseline or '-')} → {short(finding.candidate or '-')}"
         if finding.of == "series":
             values = " at its samples"
-        reason = f", {finding.reason}" if finding.reason and change.decades(finding.metric) is None else ""
+        unchanged = abs(change.decades(finding.metric) or 0.0) < _LEAST_LOSS
+        reason = f", {finding.reason}" if finding.reason and unchanged else ""
         named = frozenset(c.identity for _, c, _ in cases)
         also = f"; also on {plural(len(named) - 1, 'other row')}" if len(named) > 1 else ""
         error = Verdict.WORSE in verdicts and (finding.of == "series" or change.decades(finding.metric) is not None)
