@@ -257,6 +257,7 @@ def test_a_program_that_says_that_it_failed_keeps_the_states_so_far() -> None:
     run = ht.propagate(CASE.top, CASE.start, TIMES, integrator=program("aborts"))
     assert (run.outcome, run.flags["failure"]) == (Outcome.FAILED, "no convergence at t = 1.3")
     assert len(run.states) == 0
+    assert repr(run).endswith("reached t = 0 only; rk4 says: no convergence at t = 1.3")
     for option in ("high_accuracy", "compact_mode"):
         with pytest.raises(InputError, match=f"does not support {option}"):
             ht.propagate(CASE.top, CASE.start, TIMES, integrator=program(), **{option: True})

@@ -563,7 +563,8 @@ class Trajectory(Tabular, InSpace):
         if self.times and not rows:
             notes.append(f"{len(self.times)} states were passed to the observer")
         if self.outcome is not Outcome.SUCCESS:
-            notes.append(f"reached t = {six_digits(self.time_reached)} only")
+            reason = f"; {self.integrator} says: {self.flags['failure']}" if "failure" in self.flags else ""
+            notes.append(f"reached t = {six_digits(self.time_reached)} only{reason}")
         if (steady := self.stability) is not None:
             notes.append(steady.text(precision.bits))
         if lost := self.amplification_text():
