@@ -588,17 +588,38 @@ def control_apart(which: str | IntegratorSource) -> str:
 def available() -> dict[str, str | None]:
     """For each peer: None if it can be used, else why not, and the remedy.
 
-    One of this program's is not imported: the packages that it needs are looked for.  One of another package is.
+    One of this program's is not imported: the packages that it needs are looked for.  One of another package is, in a
+    process of its own, which it may end or hold.
     """
     reasons: dict[str, str | None] = {}
     for name, entry in known().items():
-        reasons[name] = None
-        if not entry.own or entry.lacks:
-            try:
-                peer(name)
-            except InputError as error:
-                reasons[name] = f"{error.cause} {error.remedy}"
+        reasons[name] = (_lacking(name) if entry.lacks else None) if entry.own else _lacking_apart(name, entry)
     return reasons
+
+
+def _lacking(name: str) -> str | None:
+    """Why a peer cannot be used, and the remedy."""
+    try:
+        peer(name)
+    except InputError as error:
+        return f"{error.cause} {error.remedy}"
+    return None
+
+
+def _lacking_apart(name: str, entry: Integrator) -> str | None:
+    from concurrent.futures.process import BrokenProcessPool
+
+    from heavytop.processes import GuardedProcess
+
+    process = GuardedProcess()
+    try:
+        return process.submit(_lacking, name).result(timeout=_PATIENCE)
+    except BrokenProcessPool:
+        return f"The integrator {name} ends the process that imports it. {entry.remedy}"
+    except TimeoutError:
+        return f"The integrator {name} is not imported within {_PATIENCE} s. {entry.remedy}"
+    finally:
+        process.end()
 
 
 # Runs of so many steps that nobody waits for them are refused, whatever the units of the data.
