@@ -1,5 +1,7 @@
 """The detectors see what they should, and raise no alarm at a healthy run."""
 
+import pickle
+
 import pytest
 
 from heavytop.api import selftest
@@ -35,3 +37,10 @@ def test_what_is_not_caught_says_how_far_it_moved(trials) -> None:
     assert (trial.verdict, trial.caught_by, trial.as_expected) == ("same", [], True)
     assert trial.shift is not None
     assert trial.shift[1] > 0
+
+
+def test_every_task_reaches_a_worker() -> None:
+    tasks = selftest.tasks()
+    for task, sent in zip(tasks, pickle.loads(pickle.dumps(tasks)), strict=True):
+        assert sent.source == task.source
+        assert sent.key == task.key

@@ -81,6 +81,10 @@ class Fault:
     silent: bool = False
     detectable: bool = True
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle by name, for the functions of a fault have none."""
+        return _named, (next(name for name, fault in FAULTS.items() if fault is self),)
+
     @property
     def integrator(self) -> Integrator:
         """The plug-in with its capabilities."""
@@ -165,3 +169,7 @@ FAULTS = {
     "silent stop": Fault("stops early without a report", stops=Fraction(3, 4), silent=True),
 }
 """Each fault by name."""
+
+
+def _named(name: str) -> Fault:
+    return FAULTS[name]
