@@ -125,7 +125,7 @@ def remembering(key_of):
     def peer(top, start, times, precision, *, system, tolerance=None):
         key = key_of(start), tuple(times)
         if key not in seen:
-            sleep(0.01)
+            sleep(0.04)
             seen[key] = run(top, start, times, precision, system)
         return seen[key]
     return peer
