@@ -89,11 +89,7 @@ def read_table(text: str, started: bool = False) -> tuple[dict[str, Any], list[s
     else:
         header, body, lines = first, body[1:], lines[1:]
         below = _cells(body[0], separator) if body else []
-        if (
-            1 < len(below) <= len(first)
-            and not _is_number(below[0])
-            and not any(map(_is_number, {*below} - {"1", "1/s"}))
-        ):
+        if 1 < len(below) <= len(first) and _are_units(below):
             header = [f"{name} [{unit.strip('[]()')}]" for name, unit in zip_longest(first, below, fillvalue="")]
             body, lines = body[1:], lines[1:]
     names, notes = _without_header(first) if header is None else (header, [])
@@ -247,12 +243,16 @@ def _is_number(text: str) -> bool:
     return bool(re.fullmatch(r"[+-]?(\.?\d.*|nan(\(.*\))?|inf(inity)?)", text, re.IGNORECASE))
 
 
+def _are_units(cells: list[str]) -> bool:
+    """Whether the row below the names of the columns has units in it; 1 is that of γ."""
+    return not _is_number(cells[0]) and not any(map(_is_number, {*cells} - {"1", "1/s"}))
+
+
 def _is_header(names: list[str], width: int) -> bool:
     """Whether the words of a comment name the columns, of rows of this width."""
     try:
-        header = observed_columns.header(
-            list(dict.fromkeys(names))
-        )  # one that stands twice is refused where it is used
+        # one that stands twice is refused where it is used
+        header = observed_columns.header(list(dict.fromkeys(names)))
     except InputError:  # of a sentence, unless these are as many as the columns
         return len(names) == width
     has_time = header.time is not None or names[:1] == ["%time"]
