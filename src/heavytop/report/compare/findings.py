@@ -129,6 +129,12 @@ class Change(NamedTuple):
         worse = (self.decades(finding.metric) for finding in self.findings if finding.verdict is Verdict.WORSE)
         return max((moved for moved in worse if moved is not None), default=0.0)
 
+    @property
+    def lost_accuracy(self) -> bool:
+        """Whether errors or samples are worse, and not only beyond the limit of a policy."""
+        worse = [finding for finding in self.findings if finding.verdict is Verdict.WORSE]
+        return self.largest_loss >= _LEAST_LOSS or any(finding.of == "series" for finding in worse)
+
     def about(self, finding: Finding) -> Quantity | None:
         """The quantity of a metric or series, without its statistic; None for laws, seconds, whole rows."""
         quantity = self.measured(finding)
@@ -212,11 +218,13 @@ class Changes:
         if len(points) < 2 or not all(abs(change.growth_of_steps) <= _STEPS_MOVED for change in changed):
             return ""
         finest = max(steps for (steps, _), _ in points)
-        losses = {math.log10(change.old.steps): change.largest_loss for change in changed if change.old}
-        largest = losses.pop(finest, 0.0)
-        if largest < _LEAST_LOSS or any(loss > _LESS * largest for loss in losses.values()):
+        settings = {math.log10(change.old.steps): change for change in changed if change.old}
+        worst = settings.pop(finest, None)
+        if worst is None or not worst.lost_accuracy:
             return ""
-        return "lost less" if losses else "are the same"
+        if any(change.largest_loss > _LESS * worst.largest_loss for change in settings.values()):
+            return ""
+        return "lost less" if settings else "are the same"
 
     @property
     def worst_first(self) -> list[Change]:
