@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
-from importlib.metadata import EntryPoint
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,7 @@ from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, exact, number, real
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
-from support.helpers import distance, run_peer
+from support.helpers import distance, named_peers, run_peer
 from support.in_process import heavytop
 
 F = Fraction
@@ -70,10 +70,10 @@ def test_capabilities_are_those_of_the_functions(name: str) -> None:
                 registry.propagator(name, {})(GENERIC.top, GENERIC.start, [F(0)], form)
 
 
-def test_an_integrator_added_as_the_manual_says_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_integrator_added_as_the_manual_says_is_listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An entry point, and a line of the table."""
-    entry = EntryPoint("mine:own", "heavytop.integrate.peers.splitting:order2", "heavytop.peers")
-    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: [entry])
+    named_peers(tmp_path, {"own": "heavytop.integrate.peers.splitting:order2"})
+    monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(registry, "_of_packages", lru_cache(registry._of_packages.__wrapped__))
     monkeypatch.setitem(INTEGRATORS, "new", replace(INTEGRATORS["splitting:2"], name="new"))
     shown = heavytop("list", "--json")
