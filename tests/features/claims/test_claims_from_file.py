@@ -146,6 +146,7 @@ WRONG_KEYS = [
     ({"top": top() | {"center": ["0", "0", "1"]}}, "unknown field `center` in top; the nearest key is centre"),
     ({"top": top() | {"\x1b[31m": "1"}}, r"unknown field `\\x1b\[31m` in top\."),
     ({"id": "An id"}, "id must be lower-case words joined by hyphens"),
+    ({"name": ""}, "name must be text of length >= 1"),
 ]
 
 

@@ -283,11 +283,11 @@ def test_xi_and_radii_that_heavytop_writes_itself_are_not_spoken_of() -> None:
 @pytest.mark.parametrize(
     ("names", "message"),
     [
-        ("t,wx deg/s,wy deg/s,wz deg/s,gamma1,gamma2,gamma3", "'wx deg/s' looks like one of angular velocity"),
-        ("t,wx_dps,wy_dps,wz_dps,gamma1,gamma2,gamma3", "'wx_dps' looks like one of angular velocity"),
+        ("t,wx deg/s,wy deg/s,wz deg/s,gamma1,gamma2,gamma3", "'wx deg/s' looks like a component of angular velocity"),
+        ("t,wx_dps,wy_dps,wz_dps,gamma1,gamma2,gamma3", "'wx_dps' looks like a component of angular velocity"),
         ("t,omega1 {rpm},omega2 {rpm},omega3 {rpm},qw,qx,qy,qz", "'omega1 {rpm}' looks like"),
-        ("t,omega1,omega2,omega3,gamma1 m,gamma2 m,gamma3 m", "'gamma1 m' looks like one of gamma"),
-        ("t,qw,qx,qy,qz,x mm,y mm,z mm", "'x mm' looks like one of position"),
+        ("t,omega1,omega2,omega3,gamma1 m,gamma2 m,gamma3 m", "'gamma1 m' looks like a component of gamma"),
+        ("t,qw,qx,qy,qz,x mm,y mm,z mm", "'x mm' looks like a component of position"),
         ("t,x,y,z,w,x,y,z", "more than four may belong to a quaternion"),
     ],
 )

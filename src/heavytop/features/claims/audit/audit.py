@@ -103,7 +103,7 @@ def _with_name(cause: str, claim: Mapping[str, Any]) -> str:
     table = cause.partition("[...]")[0]
     for name, value in claim[table].items() if "[...]" in cause else ():
         try:
-            msgspec.convert({table: {name: value}, "name": "", "kind": "", "top": _ANY_TOP}, ClaimFile)
+            msgspec.convert({table: {name: value}, "name": "claim", "kind": "", "top": _ANY_TOP}, ClaimFile)
         except msgspec.ValidationError:
             return cause.replace("[...]", f".{quoted(name)[1:-1]}", 1)
     return cause

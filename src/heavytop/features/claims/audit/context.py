@@ -136,7 +136,7 @@ class ComponentTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class ClaimFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The file; entry: its keys as an entry of the library, where it is one."""
 
-    name: Annotated[str, msgspec.Meta(max_length=80)]
+    name: Annotated[str, msgspec.Meta(min_length=1, max_length=80)]
     kind: str
     top: TopTable
     stable: bool | None = None

@@ -204,7 +204,7 @@ def _require_no_quantity(name: str, indices: Mapping[str, object]) -> None:
         named = quantity[0] in (*_OMEGA, "gamma") or (quantity[0] and "_" not in parts[end])
         if named and not {quantity[0], *(_OMEGA if quantity[0] in _OMEGA else ())} & indices.keys():
             raise InputError(
-                f"The column {quoted(name)} looks like one of {_words(quantity[0])}, but its name is not known.",
+                f"The column {quoted(name)} looks like a component of {_words(quantity[0])}, but the name is unknown.",
                 f"Write a unit in brackets, {quoted(begun + ' [unit]')}, or give the column another name.",
             )
 

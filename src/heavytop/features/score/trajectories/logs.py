@@ -119,7 +119,7 @@ def require_understood(names: Sequence[str], others: Sequence[str], quantities: 
     for name in others:
         looks = next((what for what in missing if _LOOKS[what].search(name)), None)
         if looks and not _OTHER.match(name):
-            raise InputError(f"The column {quoted(name)} looks like {looks}, but its name is not known.", NAMES)
+            raise InputError(f"The column {quoted(name)} looks like {looks}, but the name is unknown.", NAMES)
         if len(missing) == len(_GIVES) and _INDEX.fullmatch(name):
             raise InputError(
                 f"The joint of the column {quoted(name)} is not declared.",
