@@ -10,7 +10,7 @@ from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import midpoint
 from heavytop.integrate.multiword.motions import propagate_multiword
 from heavytop.multiword.codegen.recurrence import rates, series_rates
-from heavytop.multiword.integers.integer_series import IntegerMotion, field_of, in_invariant_plane
+from heavytop.multiword.integers.integer_series import IntegerMotion, field_of
 from heavytop.multiword.problem import Scaled, Status
 from heavytop.precision import exact
 from support.helpers import random_parameters, vector
@@ -52,7 +52,7 @@ def test_components_that_stay_0_are_those_whose_taylor_coefficients_are_0(system
         rotor = tuple(share * value for value in drawn.rotor) if isinstance(drawn.rotor, tuple) else drawn.rotor
         y = tuple(value * random.choice((0, 0, 1)) for _ in range(2 + attitude) for value in vector(random))
         problem = Scaled.of(system, drawn._replace(moment=moment, rotor=rotor), y)
-        plane = in_invariant_plane(problem)
+        plane = problem.in_invariant_plane()
         series = [problem.state]
         while len(series) < 8:
             series.append(tuple(rate / len(series) for rate in series_rates(system, problem.coefficients, series)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from shlex import join, quote
 from typing import TYPE_CHECKING, Annotated
@@ -52,11 +53,7 @@ def gate(
         raise InputError(f"{out} is named twice.", "Give different folders for the new report and the baseline.")
     code = Path(integrator.partition(":")[0]) if integrator else None
     require_apart((markdown, junit, html), baseline, out, rules, Path(plan), code)
-    for file in filter(None, (markdown, junit, html)):  # what can be refused is, before minutes of measuring
-        if not absolute(file).parent.is_dir() and fresh not in absolute(file).parents:
-            raise InputError(f"{file} cannot be written: its folder does not exist.", "Give a file in another folder.")
-    if trusted.is_file():
-        raise InputError(f"{baseline} is a file.", "Give a folder as --baseline.")
+    _require_usable((markdown, junit, html), baseline, fresh)
     if rules is not None:
         load(rules)
     command_line = join(["heavytop", *sys.argv[1:], "--bless"])
@@ -90,6 +87,15 @@ def gate(
         show = f"heavytop compare {quote(str(baseline))} {quote(str(out))}{by_rules} --full"
         show_on_terminal(comparison(differences, for_full=show))
     return differences.exit_code
+
+
+def _require_usable(files: Iterable[Path | None], baseline: Path, fresh: Path) -> None:
+    """Refuse, before minutes of measuring, files without a folder and a file as baseline."""
+    for file in filter(None, files):
+        if not absolute(file).parent.is_dir() and fresh not in absolute(file).parents:
+            raise InputError(f"{file} cannot be written: its folder does not exist.", "Give a file in another folder.")
+    if absolute(baseline).is_file():
+        raise InputError(f"{baseline} is a file.", "Give a folder as --baseline.")
 
 
 def _bless(

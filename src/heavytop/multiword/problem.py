@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from fractions import Fraction
 from math import isqrt
@@ -26,7 +26,7 @@ from heavytop.multiword.codegen.machine_code import (
     once,
     pointer,
 )
-from heavytop.multiword.codegen.recurrence import Coefficients, coefficients
+from heavytop.multiword.codegen.recurrence import ZERO, Coefficients, coefficients, permutations
 from heavytop.precision import cross
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, Parameters, System
 
@@ -97,6 +97,7 @@ class ResumableRun(Steps):
 
 
 _ROOT_BITS = 24
+OTHER_AXES = ((1, 2), (2, 0), (0, 1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +137,43 @@ class Scaled:
     def exponents(self) -> tuple[int, ...]:
         """log2 of the sizes."""
         return tuple(size.numerator.bit_length() - size.denominator.bit_length() for size in self.sizes)
+
+    def products(self, component: int) -> dict[tuple[int, int], Fraction]:
+        """Pair of components -> coefficient, of the quadratic part of one component's rate."""
+        vector, axis = divmod(component, 3)
+        j, k = OTHER_AXES[axis]
+        if vector == 0:
+            return {(j, k): self.coefficients.vectors[0][0][axis]}
+        return {(3 * vector + j, k): Fraction(1), (3 * vector + k, j): Fraction(-1)}
+
+    def linear(self, component: int) -> dict[int, Fraction]:
+        """Component -> coefficient, of the linear part of one component's rate."""
+        first = component < 6
+        lane, offset = (component, 0) if first else (component - 3, 3)
+        terms: dict[int, Fraction] = {}
+        table = self.coefficients.vectors[0 if first else 1][1:]
+        for row, permutation in zip(table, permutations(self.system), strict=True):
+            source, c = permutation[lane], row[lane]
+            if c and source != ZERO:
+                terms[source + offset] = terms.get(source + offset, Fraction(0)) + c
+        return terms
+
+    def in_invariant_plane(self) -> Scaled:
+        """The problem with rates that are exactly 0 in each component that is 0 at all times.
+
+        Each term of such a rate has a factor that is 0 at all times.  The lanes compute γ × Ω from sums, whose rounding
+        errors would grow about an unstable axis, as in a pendulum about the middle one.  The coefficients no longer
+        serve the variational equation.
+        """
+        zeros = {k for k, value in enumerate(self.state) if not value}
+        while moving := {k for k in zeros if not self._vanishes(k, zeros)}:
+            zeros -= moving
+        return replace(self, coefficients=self.coefficients.without(zeros)) if zeros else self
+
+    def _vanishes(self, component: int, zeros: set[int]) -> bool:
+        """Whether the rate of a component is 0 wherever ``zeros`` are."""
+        products = all(zeros.intersection(pair) for pair, c in self.products(component).items() if c)
+        return products and zeros.issuperset(self.linear(component))
 
     def back(self, state: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
         """A state in the units of the problem."""

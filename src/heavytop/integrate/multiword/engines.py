@@ -16,7 +16,7 @@ from heavytop.multiword.double_double.double_double_run import FALL_IN_LANES, Fl
 from heavytop.multiword.fixed_point import fixed_point_run
 from heavytop.multiword.fixed_point.arithmetic import Grid, grid_for
 from heavytop.multiword.fixed_point.fixed_point_run import Fixed
-from heavytop.multiword.integers.integer_series import IntegerMotion, in_invariant_plane
+from heavytop.multiword.integers.integer_series import IntegerMotion
 from heavytop.multiword.problem import ResumableRun, Scaled, Status, Steps
 from heavytop.precision import DOUBLE, OncePerArguments, Precision, cache_last_call, decimal_text
 from heavytop.top.equations import System
@@ -189,10 +189,10 @@ def choose(problem: Problem, tolerance: Fraction | None) -> tuple[Arithmetic, Sc
     """
     wanted = wanted_tolerance(problem.precision, tolerance)
     start = (*problem.start.flat, *(problem.xi or ()))
-    scaled = in_invariant_plane(Scaled.of(problem.system, problem.parameters, start))
+    scaled = Scaled.of(problem.system, problem.parameters, start).in_invariant_plane()
     if (double_double := floats(wanted, scaled)) is not None:
         return double_double, scaled
-    scaled = in_invariant_plane(Scaled.of(problem.system, problem.parameters, start, bounded=True))
+    scaled = Scaled.of(problem.system, problem.parameters, start, bounded=True).in_invariant_plane()
     accuracy_bits = wanted.denominator.bit_length() - wanted.numerator.bit_length()
     bits = accuracy_bits + _GUARD_BITS + fixed_point_run.spread(scaled) + fixed_point_run.excess(scaled)
     grid = grid_for(bits)

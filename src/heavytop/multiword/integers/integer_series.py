@@ -9,7 +9,7 @@ don't be too lazy", 2002).  All sums are exact, so the coefficients do not depen
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from fractions import Fraction
 from math import lcm
 from operator import mul
@@ -18,8 +18,7 @@ from typing import Protocol
 from flint import fmpz_poly
 from gmpy2 import mpz
 
-from heavytop.multiword.codegen.recurrence import ZERO, permutations
-from heavytop.multiword.problem import ResumableRun, Scaled, Status
+from heavytop.multiword.problem import OTHER_AXES, ResumableRun, Scaled, Status
 
 _BLOCK = 64
 
@@ -140,7 +139,6 @@ class _Series:
 _MANY_ORDERS, _FEW_ORDERS = 0.45, 0.27
 _FIRST_HALVINGS = 2
 _MOST_HALVINGS = 64
-_PAIRS = ((1, 2), (2, 0), (0, 1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,53 +157,14 @@ def field_of(problem: Scaled, forwards: bool) -> _Field:
     sign = 1 if forwards else -1
     vectors = 1 + (len(problem.state) - 3) // 3
     turning = [
-        (3 * v + j, k) for v in range(1, vectors) for j, k in (pair for a, b in _PAIRS for pair in ((a, b), (b, a)))
+        (3 * v + j, k) for v in range(1, vectors) for j, k in (pair for a, b in OTHER_AXES for pair in ((a, b), (b, a)))
     ]
-    pairs = (*_PAIRS, *turning)
+    pairs = (*OTHER_AXES, *turning)
     rows = []
     for component in range(len(problem.state)):
-        products = {pairs.index(pair): c for pair, c in _products(problem, component).items()}
-        rows.append(_row(products, _linear(problem, component), sign))
+        products = {pairs.index(pair): c for pair, c in problem.products(component).items()}
+        rows.append(_row(products, problem.linear(component), sign))
     return _Field(pairs, tuple(rows))
-
-
-def in_invariant_plane(problem: Scaled) -> Scaled:
-    """The problem with rates that are exactly 0 in each component that is 0 at all times.
-
-    Each term of such a rate has a factor that is 0 at all times.  The lanes compute γ × Ω from sums, whose rounding
-    errors would grow about an unstable axis, as in a pendulum about the middle one.
-    """
-    zeros = {k for k, value in enumerate(problem.state) if not value}
-    while moving := {k for k in zeros if not _vanishes(problem, k, zeros)}:
-        zeros -= moving
-    return replace(problem, coefficients=problem.coefficients.without(zeros)) if zeros else problem
-
-
-def _vanishes(problem: Scaled, component: int, zeros: set[int]) -> bool:
-    products = all(zeros.intersection(pair) for pair, c in _products(problem, component).items() if c)
-    return products and zeros.issuperset(_linear(problem, component))
-
-
-def _products(problem: Scaled, component: int) -> dict[tuple[int, int], Fraction]:
-    """Pair of components -> coefficient, of the quadratic part of one component's rate."""
-    vector, axis = divmod(component, 3)
-    j, k = _PAIRS[axis]
-    if vector == 0:
-        return {(j, k): problem.coefficients.vectors[0][0][axis]}
-    return {(3 * vector + j, k): Fraction(1), (3 * vector + k, j): Fraction(-1)}
-
-
-def _linear(problem: Scaled, component: int) -> dict[int, Fraction]:
-    """Component -> coefficient, of the linear part of one component's rate."""
-    first = component < 6
-    lane, offset = (component, 0) if first else (component - 3, 3)
-    terms: dict[int, Fraction] = {}
-    table = problem.coefficients.vectors[0 if first else 1][1:]
-    for row, permutation in zip(table, permutations(problem.system), strict=True):
-        source, c = permutation[lane], row[lane]
-        if c and source != ZERO:
-            terms[source + offset] = terms.get(source + offset, Fraction(0)) + c
-    return terms
 
 
 def _row(products: dict[int, Fraction], linear: dict[int, Fraction], sign: int) -> QuadraticComponent:
