@@ -197,7 +197,9 @@ def test_a_candidate_that_no_longer_says_its_request_is_incomparable() -> None:
     for kind in ("drift", "survey"):
         silent = [msgspec.structs.replace(row, request=msgspec.UNSET) for row in base(kind).rows]
         without = msgspec.structs.replace(base(kind), rows=silent)
-        assert compare(base(kind), without, Policy()).verdict == "incomparable"
+        silenced = compare(base(kind), without, Policy())
+        assert silenced.verdict == "incomparable"
+        assert all("the candidate does not state its request" in finding.reason for finding in silenced.changed)
         assert compare(without, base(kind), Policy()).verdict == ("same" if kind == "drift" else "incomparable")
 
 

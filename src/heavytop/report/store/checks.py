@@ -53,6 +53,8 @@ def other_request(old: Row, new: Row) -> str:
     before, after = old.request, new.request or {}
     for name in sorted(before.keys() | after.keys()):
         expected, requested = (part.get(name) or "none" for part in (before, after))
+        if expected != requested and not after:
+            return f"the candidate does not state its request; that of the baseline has {name} {expected[:60]}"
         if expected != requested:
             return f"different request: {name} {expected[:60]} → {requested[:60]}"
     return ""
