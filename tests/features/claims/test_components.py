@@ -156,6 +156,38 @@ def test_an_integrand_is_real_where_the_component_moves(quantity: str, integrand
     assert audited(table).verdict == verdict
 
 
+EULER_FROM_TWO_AXES = {
+    "name": "euler",
+    "kind": "component",
+    "parameters": {"I1": "3", "I2": "2", "I3": "1", "w1": "1", "w3": "2"},
+    "top": {"inertia": ["I1", "I2", "I3"], "weight": "0", "centre": ["0", "0", "0"]},
+    "start": {"omega": ["w1", "0", "w3"], "gamma": ["0", "0", "1"]},
+}
+FACTORED = {
+    "Omega1": "I1*sqrt(I2*I3)/(sqrt(I1*(I1-I3))*sqrt(w1^2 - u^2)*sqrt(I3*(I2-I3)*w3^2 - I1*(I1-I2)*(w1^2 - u^2)))",
+    "Omega2": "I2*sqrt(I1*I3)/(sqrt(I3*(I1-I3)*w3^2 - I2*(I1-I2)*u^2)*sqrt(I1*(I1-I3)*w1^2 - I2*(I2-I3)*u^2))",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("quantity", "order", "verdict"),
+    [
+        ("Omega2", "I1 > I3", "holds"),
+        ("Omega2", "I1 != I3", "undecided"),  # both radicands are negative for I1 < I3
+        ("Omega1", "I2 > I3", "holds"),  # Omega1 turns at the start
+        ("Omega1", "I2 != I3", "undecided"),
+    ],
+)
+def test_each_radicand_of_an_integrand_is_positive_for_all_parameters(quantity: str, order: str, verdict: str) -> None:
+    table = EULER_FROM_TWO_AXES | {
+        "assume": ["w1 > 0", "w3 > 0", order, "I1 > I3" if quantity == "Omega1" else "I2 > 0"],
+        "component": {"quantity": quantity, "constants": ["I1^2*Omega1^2 + I2^2*Omega2^2 + I3^2*Omega3^2"]},
+        "quadrature": {"variable": "u", "integrand": FACTORED[quantity]},
+    }
+    assert audited(table).verdict == verdict
+
+
 @pytest.mark.parametrize(
     ("square", "verdict"), [("1 - u^2", "holds"), ("1 - 2*u^2", "refuted"), ("1 - u^2/Omega1^2", "refuted")]
 )

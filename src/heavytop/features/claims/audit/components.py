@@ -156,7 +156,32 @@ class UserComponent(UserIntegral):
             else rate_along({self._u: sympy.Integer(1)})(quadrature.expression)
         )
         # the equation without roots is equivalent where the integrand is real
-        return replace(quadrature, expression=1 / slope**2, needs=_without(quadrature.needs, self._u))
+        f = 1 / slope**2
+        kept = (self._kept_real(need, f) for need in quadrature.needs)
+        return replace(quadrature, expression=f, needs=frozenset(need for need in kept if need is not None))
+
+    def _kept_real(self, need: Need, f: sympy.Expr) -> Need | None:
+        """What remains to be proven of a condition on u for it to hold wherever u moves; None where nothing does.
+
+        There f(u) = u'^2 > 0, and R = f/c^2 has its sign.  A polynomial R with f = R g keeps its sign at the start: u
+        turns or rests at a zero of R.  Where R is 0 at the start, it takes the sign of g.
+        """
+        u, radicand = self._u, need.expression
+        if u not in radicand.free_symbols:
+            return need
+        if need.kind is ConditionKind.NONZERO:
+            return None  # f is finite and not 0 where u moves
+        cofactor = sympy.cancel(f / radicand)
+        if not cofactor.is_rational_function(u):
+            return need
+        if _is_square(cofactor):
+            return None
+        common = sympy.gcd(radicand, sympy.denom(cofactor)) if self.start and radicand.is_polynomial(u) else u
+        if u in common.free_symbols:
+            return need
+        begin = {u: self._at_start(self.quantity.expression)}
+        at_start = sympy.factor(radicand.xreplace(begin))
+        return Need(ConditionKind.POSITIVE, at_start if at_start != 0 else sympy.factor(cofactor.xreplace(begin)))
 
     def _of(self, name: str, table: QuadratureTable | ComponentTable | None) -> Formula | None:
         """A formula of a table, which may contain t in [component]; None where absent."""
@@ -329,6 +354,12 @@ class UserComponent(UserIntegral):
                     made("angle", index, residual, f"{name}' of {name}", Formulas((c, angle.expression), needs))
                 )
         return equations
+
+
+def _is_square(e: sympy.Expr) -> bool:
+    """Whether it is a positive number times the square of a rational function."""
+    constant, factors = sympy.factor_list(sympy.numer(e) * sympy.denom(e))
+    return constant.is_positive is True and all(power % 2 == 0 for _, power in factors)
 
 
 def _after(rates: Sequence[_Value], time: Fraction) -> _Value:
