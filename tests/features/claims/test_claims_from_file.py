@@ -147,6 +147,7 @@ WRONG_KEYS = [
     ({"top": top() | {"\x1b[31m": "1"}}, r"unknown field `\\x1b\[31m` in top\."),
     ({"id": "An id"}, "id must be lower-case words joined by hyphens"),
     ({"name": ""}, "name must be text of length >= 1"),
+    ({"start": {"gamma": ["0", "0", "1"]}}, r"a claim of kind 'integral' does not use gamma of \[start\]"),
 ]
 
 

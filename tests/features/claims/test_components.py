@@ -287,9 +287,14 @@ def test_the_papers_rate_of_psi_is_refuted_for_the_top_by_conditions_that_do_not
         ({"start": None}, "start"),
         ({"component": {"reduced": None}}, "reduced"),
         ({"component": {"quantity": "C"}}, "constant"),
+        ({"quadrature": {"integrand": "u"}}, "gives reduced and integrand"),
+        ({"component": {"reduced": None}, "quadrature": {"time": "u", "integrand": "1"}}, "gives time and integrand"),
+        ({"component": {"value": None}}, "does not use psi of .component. without value"),
+        ({"quadrature": {"where": ["u > 5"]}}, "does not use where"),
+        ({"start": {"angles": ["0", "0", "1"]}}, "does not use angles of .start"),
     ],
 )
-def test_a_component_without_what_it_needs_is_refused(change: dict[str, Any], message: str) -> None:
+def test_a_component_whose_parts_lack_or_contradict_others_is_refused(change: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         audit(**change)
 

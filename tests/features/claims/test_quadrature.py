@@ -122,6 +122,7 @@ def test_a_quadrature_needs_an_inverse(angle: str, time: str, where: tuple[str, 
         ({"where": ["v > 0"]}, "unknown name 'v'"),
         ({"points": ["x"]}, "quadrature.points"),
         ({"low": "0"}, "low"),
+        ({"psi": "u"}, "does not use psi of [quadrature]"),
     ],
 )
 def test_what_cannot_be_a_quadrature_is_refused(change: dict[str, Any], said: str) -> None:

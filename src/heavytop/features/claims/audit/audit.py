@@ -7,7 +7,7 @@ import re
 import signal
 import sys
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
@@ -91,11 +91,26 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> FileClaim | ValueC
         raise InputError(f"{where}: stable must be true or false of kind 'stability', and of no other.", _REMEDY)
     if content.quadrature is not None and needed == "integral":
         raise InputError(f"{where}: [quadrature] is about a motion, and kind = {content.kind!r}.", _REMEDY)
+    if unused := next(_unused(content), ""):
+        cause = f"{where}: a claim of kind {content.kind!r} does not use {unused}."
+        raise InputError(cause, "Leave it out, or state it in a claim of its own.")
     if content.domain not in ("all", "t<=0", "t>0"):
         raise InputError(f'{where}: domain must be "all", "t<=0" or "t>0"; got {content.domain[:40]!r}.', "Change it.")
     content = msgspec.structs.replace(content, entry=entry)
     with prefixed(where):
         return claim_class(content)
+
+
+def _unused(content: ClaimFile) -> Iterator[str]:
+    """Entries of a claim that its audit would ignore."""
+    component, angles, attitude = content.component, ("phi", "theta", "psi"), ("angles", "quaternion", "matrix")
+    unused = {
+        "[start]": (content.start, attitude if component else ("omega", "gamma", *attitude)),
+        "[quadrature]": (content.quadrature, ("where", "points") if component else angles),
+        "[component] without value": (component, angles if component and component.value is None else ()),
+    }
+    for table, (part, names) in unused.items():
+        yield from (f"{name} of {table}" for name in names if getattr(part, name, None))
 
 
 def _with_name(cause: str, claim: Mapping[str, Any]) -> str:

@@ -110,6 +110,13 @@ class UserComponent(UserIntegral):
     def _check(self, table: ComponentTable, quantity: Formula) -> None:
         if not quantity.expression.free_symbols & frozenset(STATE):
             raise InputError(f"component.quantity: {table.quantity[:40]!r} is constant.", "Name a component: gamma3.")
+        quadrature = self.content.quadrature
+        forms = ("reduced", table), ("time", quadrature), ("integrand", quadrature)
+        given = [name for name, part in forms if getattr(part, name, None) is not None]
+        if len(given) > 1:
+            raise InputError(
+                f"The claim gives {' and '.join(given)}.", "Give one of them, and the other in a claim of its own."
+            )
         if table.value is not None and self._square is None:
             remedy = "Give reduced = f(u) in [component], or time or integrand in [quadrature]."
             raise InputError("[component] gives a value and no reduced equation u'^2 = f(u).", remedy)
