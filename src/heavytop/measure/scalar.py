@@ -218,7 +218,10 @@ def _roundings(numbers: Sequence[Fraction], precision: Precision) -> Iterator[Ro
     single = Rounding("single", _SINGLE, worst * 2.0**-_SINGLE)
     kinds: dict[str, tuple[Callable[..., Fraction], float]] = {
         "decimals": (lambda value, digits: Fraction(round(value * 10**digits), 10**digits), 0.5),
-        "significant": (lambda value, digits: Fraction(decimal_text(value, digits)), 5 * worst),
+        "significant": (
+            lambda value, digits: Fraction(decimal_text(value, digits)),
+            5 * 10.0 ** math.floor(math.log10(worst)),
+        ),
     }
     for kind, (rounded_to, scale) in kinds.items():
         for digits in range(1, precision.digits - _SPARE):

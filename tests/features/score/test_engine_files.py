@@ -68,6 +68,14 @@ def frozen(rows: list[np.ndarray]) -> list[np.ndarray]:
     return rows[:8] + 5 * rows[8:9]
 
 
+def last_turned(columns: dict, _: object) -> dict:
+    """The last quaternion turned by 0.002."""
+    w, x, y, z = columns["quaternion"][-1]
+    return {
+        "quaternion": [*columns["quaternion"][:-1], np.array([w - 1e-3 * x, x + 1e-3 * w, y + 1e-3 * z, z - 1e-3 * y])]
+    }
+
+
 RIGHT = {"inertia": engine_files.six(FINE.tensor)}
 """What a file says of an engine that has another tensor about the centre of mass."""
 STEINER = FINE.about_pivot() - FINE.tensor
@@ -104,6 +112,10 @@ IN_FILE = [
     ("times_shifted", FINE, Log(QUATERNION, times=lambda steps, h: [n * h - 0.07 for n in steps]), {"shift": "0.07"}),
     ("frozen", FINE, Log(spoil=lambda columns, _: columns | {"quaternion": frozen(columns["quaternion"])}),
      {"vector": "γ"}),
+    ("omega_in_degrees", FINE, Log(QUATERNION, keys={"omega": engine_files.text(np.degrees(FINE.omega))}),
+     {"of": "start"}),
+    ("time_unit", FINE, Log(("position",), times=lambda steps, h: [1000 * n * h for n in steps]), {"factor": "0.001"}),
+    ("one_state", FINE, Log(QUATERNION, spoil=last_turned), {"state": "12 of 12"}),
     ("column_scaled", FINE, of_columns(lambda q: q * [1, 1, -1, 1], *QUATERNION),
      {"column": "y of the quaternion", "factor": "−1"}),
     ("column_order", FINE, of_columns(lambda q: q[[0, 1, 3, 2]], *QUATERNION),

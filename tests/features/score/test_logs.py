@@ -149,13 +149,42 @@ def rated(kind: str, more: str) -> str:
     return "\n".join(lines)
 
 
+def optitrack(unit: float, name: str) -> str:
+    """Of a rigid body, with a marker behind it."""
+    numbers = numpy.arange(11.0), TIMES, scalar_last(), unit * run().positions(), numpy.ones((11, 3))
+    columns = [("", "", "Frame"), ("", "", "Time (Seconds)"), *(("Rigid Body", "Rotation", axis) for axis in "XYZW")]
+    columns += [(kind, "Position", axis) for kind in ("Rigid Body", "Marker") for axis in "XYZ"]
+    kinds, quantities, axes = map(",".join, zip(*columns, strict=True))
+    begin = f"# quaternion_order: xyzw\nFormat Version,1.23,Rotation Type,Quaternion,Length Units,{name}\n\n"
+    return f"{HEAD}{begin}{kinds}\n{quantities}\n{axes}\n{rows(*numbers)}"
+
+
+def timetable() -> str:
+    lines = [line.replace(",", " sec,", 1) for line in rows(TIMES, quaternions()).splitlines()]
+    return "\n".join([f"{HEAD}Time,q_1,q_2,q_3,q_4", *lines])
+
+
 NANO = [f"{17 * 10**17 + k * 10**8}" for k in range(11)]
 SPLIT = [f"{1700000000 + k // 10},{k % 10 * 100000000}" for k in range(11)]
 BASILISK = ",".join(f"{name}[{k}]" for name in ("sigma_BN", "omega_BN_B") for k in range(3))
 BASILISK_1 = "sigma_BN_1,sigma_BN_2,sigma_BN_3,omega_BN_B1,omega_BN_B2,omega_BN_B3"
 TO_BODY = "REF_FRAME_A = EME2000\nREF_FRAME_B = SC_BODY_1\nRATE_FRAME = REF_FRAME_B"
 FROM_BODY = "ATTITUDE_DIR = B2A\nREF_FRAME_A = SC_BODY_1\nREF_FRAME_B = ICRF"
+TRICK = ",".join(
+    ["out.time {s}", *(f"b.quat[{k}] {{--}}" for k in range(4)), *(f"b.omega[{k}] {{rad/s}}" for k in range(3))]
+)
 FORMS |= {
+    "Trick": ("csv", lambda: f"{HEAD}{TRICK}\n{rows(TIMES, quaternions(), omegas())}"),
+    "OpenSim": (
+        "sto",
+        lambda: (
+            f"{HEAD}motion\nnRows=11\nendheader\ntime\tqw\tqx\tqy\tqz\n{rows(TIMES, quaternions(), separator=chr(9))}"
+        ),
+    ),
+    "OptiTrack": ("csv", lambda: optitrack(1.0, "Meters")),
+    "OptiTrack in millimetres": ("csv", lambda: optitrack(1000.0, "Millimeters")),
+    "timetable of MATLAB": ("csv", timetable),
+    "typeset minus": ("csv", lambda: (HEAD + "t,qw,qx,qy,qz\n" + rows(TIMES, quaternions())).replace("-", "−")),
     "ROS": ("csv", lambda: exported("stamp.sec,stamp.nanosec", SPLIT, "pose.orientation.", "twist.angular.")),
     "ROS as pandas writes it": (
         "csv",
@@ -312,6 +341,9 @@ def test_stamps_in_double_say_how_many_digits_of_the_time_they_keep(tmp_path: Pa
         ("t_sec,dcm_11,dcm_12,dcm_13,dcm_21,dcm_22,dcm_23,dcm_31,dcm_32,dcm_33", "matrix"),
         ("seconds,C00,C01,C02,C10,C11,C12,C20,C21,C22", "matrix"),
         ("t,desired_q_w,desired_q_x,desired_q_y,desired_q_z,q_w,q_x,q_y,q_z", "quaternion"),
+        ("time_usec,Quat_q0,Quat_q1,Quat_q2,Quat_q3,qdot_w,qdot_x,qdot_y,qdot_z", "quaternion"),
+        ("t,qw,qx,qy,qz,qdot_w,qdot_x,qdot_y,qdot_z,Tx,Ty,Tz,sigma_x,sigma_y,sigma_z", "quaternion"),
+        ("t,wx,wy,wz,rx [deg],ry [deg],rz [deg]", "framed"),
     ],
 )  # fmt: skip
 def test_names_of_other_programs_are_understood(names: str, quantities: str) -> None:

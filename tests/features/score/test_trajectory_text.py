@@ -285,7 +285,7 @@ def test_xi_and_radii_that_heavytop_writes_itself_are_not_spoken_of() -> None:
     [
         ("t,wx deg/s,wy deg/s,wz deg/s,gamma1,gamma2,gamma3", "'wx deg/s' looks like a component of angular velocity"),
         ("t,wx_dps,wy_dps,wz_dps,gamma1,gamma2,gamma3", "'wx_dps' looks like a component of angular velocity"),
-        ("t,omega1 {rpm},omega2 {rpm},omega3 {rpm},qw,qx,qy,qz", "'omega1 {rpm}' looks like"),
+        ("t,omega1 <rpm>,omega2 <rpm>,omega3 <rpm>,qw,qx,qy,qz", "'omega1 <rpm>' looks like"),
         ("t,omega1,omega2,omega3,gamma1 m,gamma2 m,gamma3 m", "'gamma1 m' looks like a component of gamma"),
         ("t,qw,qx,qy,qz,x mm,y mm,z mm", "'x mm' looks like a component of position"),
         ("t,x,y,z,w,x,y,z", "more than four may belong to a quaternion"),
@@ -306,7 +306,7 @@ def test_what_is_of_another_quantity_is_left_out() -> None:
 @pytest.mark.parametrize(
     ("header", "said"),
     [
-        ("t [h];omega1;omega2;omega3;gamma1;gamma2;gamma3", "t in h"),
+        ("t [d];omega1;omega2;omega3;gamma1;gamma2;gamma3", "t in d"),
         ("t [s];omega1/(rev/s);omega2/(rev/s);omega3/(rev/s);gamma1;gamma2;gamma3", "omega in rev/s"),
         ("t [s];omega1 [rad/s];omega2 [1/s];omega[3];gamma1;gamma2;gamma3", ""),
     ],

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy
 
-from heavytop.features.score.diagnose.hypotheses import UNITS_OF_OMEGA, gauss_newton, other_axes
+from heavytop.features.score.diagnose.hypotheses import TIME_UNITS, UNITS_OF_OMEGA, gauss_newton, other_axes
 from heavytop.features.score.diagnose.readings import (
     BodyData,
     InitialState,
@@ -149,7 +149,7 @@ class ConventionSearch(Search):
         judged = {name: supposed[name] for name in ("drop", "is_round") if name in supposed}
         supposed = {name: value for name, value in supposed.items() if name not in judged}
         left = self.errors_if(self.early, **supposed)
-        if supposed.keys() & {"start", "body", "shift", "begin"} and not float(left.max()) <= self.refused:
+        if supposed.keys() & {"start", "body", "shift", "unit", "begin"} and not float(left.max()) <= self.refused:
             left = numpy.append(left, numpy.full(len(self.file_errors) - len(left), numpy.inf))
         else:
             left = self.errors_if(self.samples, **supposed)
@@ -161,12 +161,13 @@ class ConventionSearch(Search):
         start: Reading | None = None,
         body: BodyData | None = None,
         shift: Fraction = Fraction(0),
+        unit: Fraction = Fraction(1),
         begin: InitialState | None = None,
     ) -> SimulatedMotion | None:
         """The motion of the file with another reading of its start, another body, other times, another start."""
         body = body or samples.body
         begin = begin or samples.start.begin(start or samples.said, body.tensor)
-        return simulate(body, begin, tuple(float(time + shift if shift else time) for time in samples.times))
+        return simulate(body, begin, tuple(float(unit * time + shift) for time in samples.times))
 
     def errors_if(
         self,
@@ -180,7 +181,8 @@ class ConventionSearch(Search):
     ) -> Array:
         """The error of each sample with another reading of columns and start, or another body.
 
-        shift: the columns are those of t + shift; of Ω alone where ``rates``.  still: Ω is not compared.
+        shift: the columns are those of t + shift; of Ω alone where ``rates``.  unit: they are those of unit·t.
+        still: Ω is not compared.
         mixed: a quantity, and the matrix by which the rows of its columns are multiplied.
         begin: the start of the motion.
         """
@@ -228,6 +230,10 @@ def _steps(search: ConventionSearch) -> Iterator[Row]:
     has_more = bool(rates) and len(search.samples.columns) > len(rates)
     if has_more and not any(values.any() for values in rates.values()):
         yield "omega_zero", {}, {"still": True}
+    if search.samples.columns.keys() <= {"omega_space", "position"}:  # of which the other search knows nothing
+        turns = turning(search.samples.body, search.start) * abs(float(search.samples.times[-1]))
+        for factor in sorted(factor for factor in TIME_UNITS if factor * turns <= FARTHEST):
+            yield "time_unit", {"factor": f"{float(factor):.6g}"}, {"unit": factor}
     for part, sign in product((Fraction(1, 2), Fraction(1)), (-1, 1)) if search.step else ():
         shift = sign * part * (search.step or 0)
         yield "times_shifted", {"shift": _signed(shift)}, {"shift": shift}
@@ -375,9 +381,12 @@ def _scopes(samples: Observations, kind: str, numbers: dict[str, str], reading: 
     inertia = samples.body.tensor
     before, after = (samples.start.begin(columns, inertia) for columns in (samples.said, reading))
     moved = not (numpy.array_equal(before.rotation, after.rotation) and numpy.array_equal(before.omega, after.omega))
-    if moved:
+    of_omega = replace(samples.said, swapped=reading.swapped, omega=reading.omega, momentum=reading.momentum) == reading
+    read = not of_omega or any(name.startswith("omega") for name in samples.columns)
+    if moved and read:
         yield kind, {**numbers, "of": BOTH}, {"columns": reading, "start": reading}
-    yield kind, {**numbers, "of": COLUMNS}, {"columns": reading}
+    if read:
+        yield kind, {**numbers, "of": COLUMNS}, {"columns": reading}
     if moved:
         if kind == "omega_frame":
             space = not samples.start.in_space
@@ -419,7 +428,7 @@ def _readings(samples: Observations) -> Iterator[Named]:
         ("quaternion", "scalar_last_conjugate", {}, order | conjugate),
     ]
     named_so = {"omega_space": "omega", "rows": "gamma"}
-    given = {named_so.get(form, form) for form in forms}
+    given = {"omega", *(named_so.get(form, form) for form in forms)}  # Ω at the start
     yield from ((kind, numbers, replace(said, **changes)) for form, kind, numbers, changes in rows if form in given)
 
 
@@ -551,7 +560,9 @@ def _fitted(samples: Observations, simulated: SimulatedMotion) -> Iterator[Row]:
         both = numpy.linalg.lstsq(design.reshape(-1, 6), positions.reshape(-1), rcond=None)[0]
         reading = replace(said, of_point=tuple(both[:3]), offset=tuple(both[3:]))
         numbers = {"point": _list(both[:3]), "offset": _list(both[3:])}
-        yield "point_and_pivot", numbers, {"columns": reading, **_FITTED}
+        # a point or a pivot alone is the simpler mistake
+        if min(numpy.abs(part).max() for part in (both[:3] - point, both[3:])) > _SLIGHT * numpy.abs(both).max():
+            yield "point_and_pivot", numbers, {"columns": reading, **_FITTED}
 
 
 def _turned(samples: Observations, simulated: SimulatedMotion) -> Iterator[Row]:

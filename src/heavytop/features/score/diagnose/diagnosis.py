@@ -28,6 +28,7 @@ from heavytop.features.score.diagnose.samples import (
 )
 from heavytop.features.score.diagnose.search import (
     FIRST,
+    FLOOR,
     LIKELY_DROP,
     WORTH_ASKING,
     Array,
@@ -284,6 +285,8 @@ def _jumps(examined: Examined | None, times: Sequence[Fraction], last: int, erro
     spans = [abs(b - a) for a, b in zip([Fraction(0), *times[: last - 1]], times[:last], strict=True)]
     if examined is None or abs(times[last] - times[last - 1]) > _LONG * max(spans):
         return False
+    if numpy.isnan(examined.all_states[last]).any():  # without Ω no motion goes on from the state before
+        return bool(errors[last] * max(errors[last - 2], FLOOR) >= _ALONE * errors[last - 1] ** 2)
     expected = examined.follows(last - 1)
     if expected is None:
         return False

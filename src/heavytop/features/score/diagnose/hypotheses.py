@@ -573,7 +573,7 @@ _SHORT = 3
 _EXACTLY = 1e-9
 _MOST_STEPS = 300
 """Most steps of an interval between samples of which one too many or too few is recognised."""
-_UNITS = {Fraction(n, d) for n, d in ((1000, 1), (60, 1), (3600, 1), (1, 1000), (1, 60), (1, 3600))}
+TIME_UNITS = {Fraction(n, d) for n, d in ((1000, 1), (60, 1), (3600, 1), (1, 1000), (1, 60), (1, 3600))}
 _FEWEST_ROWS = 3
 _CIRCLE = (2 * numpy.pi, 1 / (2 * numpy.pi), numpy.pi / 180, 180 / numpy.pi)
 
@@ -584,7 +584,7 @@ def clock(run: Examined) -> Iterator[Hypothesis]:
     times_shifted by s: the state said to be at t is that of t + s.  time_unit with the factor f: it is that of f·t.
     """
     yield from _of_rows(run)
-    for factor in sorted(_UNITS | {Fraction(value) for value in _CIRCLE}):
+    for factor in sorted(TIME_UNITS | {Fraction(value) for value in _CIRCLE}):
         if abs(float(factor * run.times[-1])) * run.rate <= FARTHEST:
             errors = run.motion_errors([factor * time for time in run.times])
             yield Hypothesis("time_unit", _unit_numbers(float(factor)), errors)

@@ -26,9 +26,9 @@ _INDEXED = re.compile(r"(.*[^\W\d_])((?:[\[(]\s*[0-4wxyz]\s*(?:,\s*[0-4wxyz]\s*)
 _PATTERNS = tuple(
     (quantity, re.compile(pattern))
     for quantity, pattern in (
-        ("quaternion", r"(?:q|quat|quaternion)([wxyz0-4])"),
+        ("quaternion", r"(?:q|quat|quatq|quaternion)([wxyz0-4])"),
         ("matrix", r"(?:r|m|a|c|dcm|rot|rotation|matrix)([0-3])([0-3])"),
-        ("rodrigues", r"(?:sigma|mrp|σ)([xyz0-3])"),
+        ("rodrigues", r"(?:sigma|σ)([0-3])|mrp([xyz0-3])"),
         ("rotation_vector", r"(?:rotvec|rotationvector|rv)([xyz123])"),
         ("framed", r"w([xyz])"),
         ("omega_space", r"(?:w|omega|om|ω)(?:space|world|global|inertial|s)([xyz123])"),
@@ -67,18 +67,21 @@ _SECOND = {
     **dict.fromkeys(("us", "μs", "usec", "microseconds"), Fraction(1, 10**6)),
     **dict.fromkeys(("ns", "nsec", "nanoseconds"), Fraction(1, 10**9)),
     **dict.fromkeys(("min", "minutes"), Fraction(60)),
+    **dict.fromkeys(("h", "hr", "hours"), Fraction(3600)),
 }
 _RATE = {
     **{f"{unit}{second}": Fraction(1, 180) for unit in ("deg", "degree", "degrees", "°") for second in _A_SECOND},
     "dps": Fraction(1, 180),
     **dict.fromkeys(("rpm", "rev/min", "r/min"), Fraction(1, 30)),
 }
+_ANGLE = dict.fromkeys(("deg", "degree", "degrees", "°"), Fraction(1, 180))
 _METRE = {"mm": Fraction(1, 10**3), "cm": Fraction(1, 100)}
 _LENGTHS = ("m", *_METRE)
 _OMEGA = ("omega", "omega_space", "framed")
-_UNITS = {"t": _SECOND, "omega": _RATE, "omega_space": _RATE, "framed": _RATE, "position": _METRE}
-"""Units of a header in those of the data: s, rad/s (as multiples of π) and m."""
-_OF_DATA = ("", "1", "-", "s", "sec", "second", "seconds", "m", "1/s", *(f"rad{second}" for second in _A_SECOND))
+_UNITS = {"t": _SECOND, **dict.fromkeys(_OMEGA, _RATE), "position": _METRE, "rotation_vector": _ANGLE}
+"""Units of a header in those of the data: s, rad/s and rad (as multiples of π), and m."""
+_SECONDS = ("s", "sec", "second", "seconds")
+_OF_DATA = ("", "1", "-", "--", *_SECONDS, "m", "rad", "1/s", *(f"rad{second}" for second in _A_SECOND))
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +149,7 @@ def header(names: Sequence[str], joint: str = "") -> Header:
             units["t"] = {_unit("t", name)}
             continue
         meaning = _meaning(plain)
-        if meaning is None:
+        if meaning is None or (meaning[0] == "position" and _UNIT.search(name.strip())):  # rx [deg] is an angle
             others.append(name)
             continue
         quantity, component = meaning
@@ -201,7 +204,8 @@ def _require_no_quantity(name: str, indices: Mapping[str, object]) -> None:
     for end in range(1, len(parts), 2):
         begins = _plain(begun := "".join(parts[:end]))
         quantity = (None if begins in _CLASSIC else _meaning(begins)) or ("", "")
-        named = quantity[0] in (*_OMEGA, "gamma") or (quantity[0] and "_" not in parts[end])
+        is_angle = quantity[0] == "position" and _UNIT.search(name.strip())
+        named = quantity[0] in (*_OMEGA, "gamma") or (quantity[0] and "_" not in parts[end] and not is_angle)
         if named and not {quantity[0], *(_OMEGA if quantity[0] in _OMEGA else ())} & indices.keys():
             raise InputError(
                 f"The column {quoted(name)} looks like a component of {_words(quantity[0])}, but the name is unknown.",
@@ -215,7 +219,7 @@ def _unit(quantity: str, name: str) -> Unit:
     text = unicodedata.normalize("NFKC", (match[1] or match[2] or "") if match else "").lower()
     text = re.sub(r"[\s*·^().]", "", text.replace("−", "-"))
     known = _UNITS.get(quantity, {})
-    return Unit(text, known.get(text, Fraction(1)), text in _RATE and known is _RATE)
+    return Unit(text, known.get(text, Fraction(1)), text in known and known in (_RATE, _ANGLE))
 
 
 def _in_one_unit(units: Mapping[str, set[Unit]]) -> dict[str, Unit]:
@@ -257,7 +261,7 @@ def _meaning(plain: str) -> tuple[str, str] | None:
         return _NAMES[plain]
     for quantity, pattern in _PATTERNS:
         if match := pattern.fullmatch(plain):
-            return quantity, "".join(match.groups())
+            return quantity, "".join(filter(None, match.groups()))
     return None
 
 

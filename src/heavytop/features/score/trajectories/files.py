@@ -99,7 +99,7 @@ def read_table(text: str, started: bool = False) -> tuple[dict[str, Any], list[s
     names, cells, noted = logs.with_one_time(names, cells, started or not keys.keys().isdisjoint(_STARTS))
     notes += noted
     if keys.get("attitude") == "rotation vector":
-        names = [re.sub(r"^r_?([xyz])$", r"rotvec\1", name.strip()) for name in names]
+        names = [re.sub(r"^r_?([xyz])\b", r"rotvec\1", name.strip(), flags=re.IGNORECASE) for name in names]
     joint = str(keys.get("joint", ""))
     if joint == "free":  # qpos[0] to qpos[2] are where the origin of the body is
         keys.setdefault("point", ["0", "0", "0"])
@@ -270,7 +270,7 @@ def _split(body: list[str], lines: list[int], separator: str | None, width: int)
         if len(cells) != width:
             decimal_commas = separator == "," and len(cells) == 2 * width
             remedy = "For decimal commas, separate the columns by semicolons." if decimal_commas else _ALL_COLUMNS
-            if not rows and not decimal_commas:
+            if (not rows or width == 1) and not decimal_commas:
                 remedy = "Begin each line above the names of the columns with #, and name every column."
             raise InputError(f"Line {number} has {len(cells)} columns, not {width}.", remedy)
         # where a semicolon, a tab or a space separates, a comma is the point of a decimal
@@ -394,6 +394,7 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
         text = _text_of(path, content)
     if logs.is_ephemeris(text):
         text = logs.of_ephemeris(text)
+    text = logs.without_preamble(text)
     if re.match(r'\s*\{\s*"schema"\s*:\s*"heavytop-report', text):
         raise InputError(f"{shown_path} is a report, not a trajectory.", f"`heavytop show {shown_path}` shows it.")
     is_json = text.lstrip().startswith("{") if piped else path.suffix.lower() == ".json"
@@ -408,7 +409,7 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
 
 
 _ARRAYS = (".npy", ".npz", ".parquet")
-_SUFFIXES = (".json", ".csv", ".tsv", ".dat", ".txt", ".tum", ".aem", *_ARRAYS, *bags.SUFFIXES)
+_SUFFIXES = (".json", ".csv", ".tsv", ".dat", ".txt", ".tum", ".aem", ".sto", ".mot", *_ARRAYS, *bags.SUFFIXES)
 
 
 def _text_of(path: Path, content: bytes) -> str:
@@ -417,7 +418,8 @@ def _text_of(path: Path, content: bytes) -> str:
         return bags.of_bag(path)
     if suffix in _ARRAYS:
         return logs.of_arrays(content, suffix)
-    return content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+    text = content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+    return text.replace("\N{MINUS SIGN}", "-")
 
 
 def _json(text: str) -> dict[str, Any]:

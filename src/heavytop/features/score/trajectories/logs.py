@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from fractions import Fraction
 from io import BytesIO
+from itertools import zip_longest
 from typing import Any
 
 from flint import arb, fmpq
@@ -38,20 +39,23 @@ _ALIASES = tuple(
     (re.compile(rf"(?:.*[./_])?{pattern}", re.IGNORECASE), name)
     for pattern, name in (
         (r"(?:quat(?:ernion)?|orientation|rotation|attitude)(?:_w)?[./_]([wxyz])", "q{}"),
-        (r"(?:position|translation|pos)(?:_w)?[./_]([xyz])|t([xyz])", "p{}"),
+        (r"(?:position|translation|pos)(?:_w)?[./_]([xyz])|(?-i:t([xyz])|T([XYZ]))", "p{}"),  # Tx is a torque
         (r"ang_?vel_w_([xyz])", "omega_space_{}"),  # of Isaac: _w_ is the world
         (rf"(?:angular_?velocity|angular|angvel|ang_vel){_OF_BODY}[./_]([xyz])", "w{}"),
         (rf"gyr(?:o(?:scope)?)?{_OF_BODY}[./_ ]?([xyz])", "w{}"),
         # of v_w_x the w is the world
         (rf"(?:(?:(?<!_)|(?<=imu_))w{_OF_BODY}[./_]?([xyz])|w([xyz]))", "w{}"),
-        (r"(?:sim_?time|time_?s(?:ec(?:onds?)?)?|t_s(?:ec)?|seconds|elapsed(?:[_ ]?(?:s|secs?|seconds?|time))?)", "t"),
+        (r"(?:(?:out\.|sim_?)time|time_?s(?:ec(?:onds?)?)?|t_s(?:ec)?|seconds)", "t"),
+        (r"elapsed(?:[_ ]?(?:s|secs?|seconds?|time))?", "t"),
         (r"(?:timestamp|stamp|__time)", "timestamp"),
         (r"(?:receive|publish|log|record)_?time", "epoch"),
         (r"(?:timestamp|stamp)_?(ns|us|ms)", "timestamp [{}]"),
-        (r"(?:time|t)_?(ns|us|ms)", "t [{}]"),
+        (r"(?:time|t)_?([num]s(?:ec)?)", "t [{}]"),
         (r"%time", "epoch [ns]"),
         (r"sigma_BN[\[_(]?([0-3])[\])]?", "sigma{}"),
         (r"omega_BN_B[\[_(]?([0-3])[\])]?", "omega{}"),
+        (r"(?<!_)quat(?:ernion)?[\[(]([0-4])[\])]", "quat{}"),
+        (r"(?<!_)(?:omega|ang_?vel|angular_?velocity)[\[(]([0-3])[\])]", "omega{}"),
     )
 )
 _JOINTS = {"free": (3, 3), "ball": (0, 0)}
@@ -81,9 +85,10 @@ def canonical(name: str, joint: str = "") -> str:
 
     joint: "free" or "ball", of the columns qpos and qvel of MuJoCo.
     """
-    base, unit = _WITH_UNIT.fullmatch(name.strip()).groups()  # type: ignore[union-attr]
+    name = re.sub(r"\s\{(.*)\}$", r" [\1]", name.strip())  # units of Trick
+    base, unit = _WITH_UNIT.fullmatch(name).groups()  # type: ignore[union-attr]
     plain = _alias(base, joint)
-    return name.strip() if plain == base and unit != "[]" else f"{plain} {(unit or '').strip('[]()') and unit}".strip()
+    return name if plain == base and unit != "[]" else f"{plain} {(unit or '').strip('[]()') and unit}".strip()
 
 
 def _alias(text: str, joint: str) -> str:
@@ -106,7 +111,7 @@ def require_understood(names: Sequence[str], others: Sequence[str], quantities: 
     names: of all columns; others: of those that are not read.
     """
     missing = [what for what, given in _GIVES.items() if not set(given) & set(quantities)]
-    if "an attitude" in missing and {"rx", "ry", "rz"} <= {name.strip().lower() for name in names}:
+    if "an attitude" in missing and {"rx", "ry", "rz"} <= {re.sub(r"\W.*", "", name.strip().lower()) for name in names}:
         raise InputError(
             "The columns rx, ry, rz are ambiguous: a rotation vector, angles, or a position.",
             "Add the line `# attitude: rotation vector` above the columns, or call a position px, py, pz.",
@@ -160,6 +165,9 @@ def with_one_time(
         if word.lower() in _COUNTED and _INSTANT.match(cells[0][place]):
             for row in cells:
                 row[place] = decimal_text(_epoch(row[place].replace(" ", "T")), 40)
+        if word.lower() in _COUNTED:
+            for row in cells:
+                row[place] = row[place].removesuffix(" sec")  # of a timetable of MATLAB
     index = next((index for word in _COUNTED for index in _places(word, words, cells)), None)
     if index is None or (words[index] == "epoch" and {"t", "time"} & set(words)):
         return names, cells, []
@@ -264,6 +272,7 @@ def with_quaternion(names: Sequence[str]) -> list[str]:
         if match and not _OTHER.match(name):
             prefixes.setdefault(match[1].lower(), {})[match[2].lower()] = index
     whole = {prefix: places for prefix, places in prefixes.items() if places.keys() == set("wxyz")}
+    whole = {"q": whole["q"]} if "q" in whole else whole
     if len(whole) > 1:
         raise InputError(f"Several columns are quaternions: {', '.join(whole)}.", "Call that of the body qw,qx,qy,qz.")
     places = {index: f"q{axis}" for part in whole.values() for axis, index in part.items()}
@@ -288,6 +297,26 @@ def of_rotation_vector(v: Sequence[Fraction]) -> tuple[Fraction, ...]:
         half = arb(sum(fmpq(x.numerator, x.denominator) ** 2 for x in v)).sqrt() / 2
         sine = midpoint(half.sin() / (2 * half))
         return midpoint(half.cos()), *(sine * x for x in v)
+
+
+def without_preamble(text: str) -> str:
+    """A table of OpenSim, or of a rigid body by OptiTrack's Motive, with the lines above it as comments."""
+    lines = text.splitlines()
+    begin = next((n for n, line in enumerate(lines) if line.startswith("Format Version,")), len(lines))
+    end = next((n for n in range(begin, len(lines)) if lines[n].startswith("Frame,")), 0)
+    if end > begin + 2:
+        kinds = next(line for line in lines[begin + 1 : end] if line.strip(",; "))
+        columns = zip_longest(*(line.split(",") for line in (kinds, *lines[end - 1 : end + 1])), fillvalue="")
+        named = {"Rotation": "q{}", "Position": f"p{{}} [{'mm' if 'Millimeters' in lines[begin] else 'm'}]"}
+        lines[end] = ",".join(
+            named[what].format(axis.lower()) if kind == "Rigid Body" and what in named else f"{kind} {what} {axis}"
+            for kind, what, axis in columns
+        )
+    elif "endheader" in lines:
+        end = lines.index("endheader") + 1
+    else:
+        return text
+    return "\n".join([*(line if line.startswith("#") else f"# | {line}" for line in lines[:end]), *lines[end:]])
 
 
 _KINDS = ("QUATERNION", "QUATERNION/RATE", "QUATERNION/ANGVEL")
