@@ -87,6 +87,7 @@ def test_a_run_that_stops_early_is_incomplete_and_keeps_what_it_reached() -> Non
         ({}, ["--integrator", "splitting:4", "--tolerance", "1e-9"], "Leave it out: --step sets the accuracy"),
         ({}, ["--quaternion", "1,0,0,0", "--matrix", "1,0,0,0,1,0,0,0,1"], "--quaternion and --matrix were given"),
         ({}, ["--mass", "2"], "--weight and --mass were given"),
+        ({}, ["--link", "arm"], "--link was given without --file"),
         ({}, ["--colour", "red"], "--colour"),
         ({"times": "1e5000,1e5000"}, [], "too large"),
         ({"inertia": "-1e5000,1,1"}, [], "must be positive"),

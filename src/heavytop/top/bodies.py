@@ -467,6 +467,8 @@ def motion_of(values: Mapping[str, Any], normalize: bool = False) -> tuple[Heavy
     data = {key: value for key, value in values.items() if value is not None and value != []}
     if "file" in data:
         return body_of(data), _start(data, normalize)
+    if "link" in data:
+        raise InputError(f"{argument('link')} was given without {argument('file')}.", "Give the file of the link.")
     for key in ("inertia", "centre"):
         _require(data, key)
     return _body(data), _start(data, normalize)
