@@ -319,12 +319,14 @@ def lagrange_quadrature() -> Family:
         _lagrange_base({}, {"integrand": f"1/sqrt({_CUBIC})", "psi": psi, "phi": phi}),
         [
             ("quadrature.integrand", "", "sqrt(A/(2*w))/sqrt((u - u1)*(u2 - u)*(u3 - u))"),
+            ("quadrature.integrand", "", "sqrt(A/(2*w))/(sqrt(u - u1)*sqrt(u2 - u)*sqrt(u3 - u))"),
             ("quadrature.psi", "", "(b/A - a*u/A)/(1 - u^2)"),
             ("quadrature.phi", "", "Omega3 - u*(Omega1*gamma1 + Omega2*gamma2)/(gamma1^2 + gamma2^2)"),
         ],
         [
             ("quadrature.integrand", "2*w", "w"),
             ("quadrature.integrand", "u2", "u3"),
+            ("quadrature.integrand", "", "sqrt(A/(2*w))/(sqrt(u1 - u)*sqrt(u - u2)*sqrt(u3 - u))"),
             ("quadrature.psi", "b - a*u", "b"),
             ("quadrature.psi", "1 - u^2", "1 - u"),
             ("quadrature.phi", "a/C", "a/A"),
