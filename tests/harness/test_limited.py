@@ -17,7 +17,7 @@ import heavytop as ht
 from heavytop.errors import InputError
 from heavytop.features.kinds import KINDS
 from heavytop.guard import how_it_ended, stopwatch
-from heavytop.harness.limited import RowLimits
+from heavytop.harness.limited import RowLimits, in_limited_process
 from heavytop.harness.plan import read
 from support.helpers import START, TOP, is_running, wait_until, without_progress
 from support.in_process import heavytop
@@ -38,6 +38,10 @@ def solve(given):
 def sleeps(given):
     time.sleep(1000)
 
+def naps(given):
+    time.sleep(0.3)
+    return midpoint(given)
+
 def stuck(given):  # in one call of C that holds the interpreter, in a process that no other integrator had
     assert "LEFT" not in os.environ
     subprocess.Popen(["sleep", "987"], start_new_session=True)
@@ -56,7 +60,8 @@ def interrupts(given):
 MODULE += MIDPOINT.format(name="midpoint")
 PLAN = """name = "faults"
 row_timeout = "2"
-integrators = ["mine.py:solve", "mine.py:sleeps", "mine.py:stuck", "mine.py:leaves", "mine.py:interrupts"]
+integrators = ["mine.py:solve", "mine.py:sleeps", "mine.py:stuck", "mine.py:leaves", "mine.py:interrupts",
+    "mine.py:naps"]
 [[integrator]]
 name = "silent"
 command = ["{python}", "{program}", "silent"]
@@ -152,6 +157,14 @@ def test_the_limit_of_a_row_follows_its_cost_and_what_the_others_took(tmp_path: 
     limits.finished(other, 1.0, 1.0)
     assert limits.seconds(other, 3.0) == 60
     assert RowLimits(7.0).seconds(task, 100.0) == 7
+
+
+@pytest.mark.slow
+def test_a_row_in_the_child_of_a_worker_of_a_cluster_says_how_long_it_took(tmp_path: Path) -> None:
+    (task,) = read(str(plan(tmp_path, "mine.py:naps")), KINDS)[2]
+    row, seconds = in_limited_process(KINDS["drift"], task, 60.0)
+    assert row.outcome == "success"
+    assert seconds > 0.3
 
 
 @pytest.mark.slow

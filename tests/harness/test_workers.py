@@ -22,7 +22,7 @@ from rich.console import Console
 from heavytop import processes
 from heavytop.errors import HeavyTopError, InputError
 from heavytop.features.kinds import KINDS
-from heavytop.harness import limited, run
+from heavytop.harness import run
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.rows import Task
 from heavytop.measure.scalar import digits_kept
@@ -110,8 +110,7 @@ def kill(pid: int) -> None:
     os.kill(pid, signal.SIGKILL)
 
 
-def test_two_processes_give_the_same_rows_as_one_even_if_one_of_them_is_killed(tasks, expected, monkeypatch) -> None:
-    monkeypatch.setattr(limited, "_SHORT", 100)  # several tasks wait behind each worker's; elsewhere none does
+def test_two_processes_give_the_same_rows_as_one_even_if_one_of_them_is_killed(tasks, expected) -> None:
     assert measured(tasks, 2, after_first=lambda: kill(active_children()[0].pid)) == expected
 
 

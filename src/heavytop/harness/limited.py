@@ -16,7 +16,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
-from itertools import islice, product
+from itertools import islice
 from typing import Any
 
 from heavytop.errors import HeavyTopError, NotAsked, OutOfTime
@@ -39,8 +39,6 @@ _MOST_OUT_OF_TIME = 2
 _MOST_DEATHS = 3
 _LOOKAHEAD = 64
 """Waiting tasks that are searched for one in the format of a worker."""
-_AHEAD, _SHORT = 4, 0.25
-"""Most tasks of a worker, the running one included, where each takes fewer seconds than that; else one."""
 
 
 @dataclass(slots=True)
@@ -109,8 +107,8 @@ class _Worker:
 
     It serves one third-party integrator at most, which may change the state of the process.
 
-    rows: of its tasks, with their indices; the first is running.  seconds: since it began, without the time that its
-    process and the program called by it waited for a processor.  precision: of its last task.
+    index, row: of its task; None without one.  seconds: since it began, without the time that its process and the
+    program called by it waited for a processor.  precision: of its last task.
     """
 
     def __init__(self, kinds: Kinds) -> None:
@@ -119,7 +117,8 @@ class _Worker:
         self._third_party = ""
         self._pid_future: Future[int] | None = None
         self._pid: int | None = None
-        self.rows: deque[tuple[int, Future[Row]]] = deque()
+        self.index = 0
+        self.row: Future[Row] | None = None
         self.precision = ""
         self.seconds = stopwatch()
         self.limit: float | None = None
@@ -131,40 +130,21 @@ class _Worker:
             return None
         return self.limit - self.seconds()
 
-    def takes(self, task: Task, ahead: int, costs: Mapping[int, float]) -> bool:
-        """Whether it may take the task behind up to ``ahead`` others, all short: no task waits for a long one."""
-        if not self.rows:
-            return True
-        short = all(costs[index] < _SHORT for index, _ in self.rows)
-        return short and self.limit is None and not task.is_third_party and len(self.rows) <= ahead
-
     def submit(self, index: int, limit: float | None, kind: MeasuredKind, task: Task, saved: Saved) -> None:
-        """Submits a task behind its others; the clock of the first starts when the process has started."""
+        """Submits a task; its clock starts when the process has started."""
         third_party = task.key.subject.name if task.is_third_party else ""
         if self._third_party not in ("", third_party):
             self.end()
         self._third_party = third_party
-        if not self.rows:
-            self.limit, self.seconds = limit, stopwatch(self._pid, with_children=True)
+        self.index, self.limit, self.seconds = index, limit, stopwatch(self._pid, with_children=True)
         if self._process is None:
             self._process = GuardedProcess(begin_worker, tuple(self._kinds.values()))
             self._pid_future = self._process.submit(os.getpid)
         try:
-            self.rows.append((index, self._process.submit(measure, kind, task, saved)))
-        except BrokenProcessPool as error:
-            if self.rows:  # reported with those before it
-                broken: Future[Row] = Future()
-                broken.set_exception(error)
-                self.rows.append((index, broken))
-            else:  # it died between two tasks
-                self.end()
-                self.submit(index, limit, kind, task, saved)
-
-    def finish(self) -> None:
-        """Removes the finished task, and restarts the clock for the next."""
-        if self.rows:
-            self.rows.popleft()
-        self.seconds = stopwatch(self._pid, with_children=True)
+            self.row = self._process.submit(measure, kind, task, saved)
+        except BrokenProcessPool:  # it died between two tasks
+            self.end()
+            self.submit(index, limit, kind, task, saved)
 
     @property
     def ending(self) -> str:
@@ -172,8 +152,8 @@ class _Worker:
         return "" if self._process is None else self._process.ending
 
     def awaited(self) -> list[Future[Any]]:
-        """The futures to wait for: the process, then its row."""
-        return [future for _, future in [*self.rows][:1]] + ([] if self._pid_future is None else [self._pid_future])
+        """The futures to wait for: the row and the process."""
+        return [future for future in (self.row, self._pid_future) if future is not None]
 
     def greet(self) -> None:
         """Guards the process group of a process that has just started, and starts the clock."""
@@ -187,8 +167,7 @@ class _Worker:
         """Kills the process and its children."""
         if self._process is not None:
             self._process.end()
-        self._process = self._pid_future = self._pid = None
-        self.rows.clear()
+        self._process = self._pid_future = self._pid = self.row = None
         self._third_party = ""
 
 
@@ -210,27 +189,25 @@ def in_processes(
     limits, deaths = RowLimits(row_timeout), Counter[int]()
     pool = [_Worker(kinds) for _ in range(max(workers, 1))]
     try:
-        while waiting or any(worker.rows for worker in pool):
-            for ahead, worker in product(range(_AHEAD), pool):
-                if waiting and worker.takes(tasks[waiting[0]], ahead, costs):
+        while waiting or any(worker.row for worker in pool):
+            for worker in pool:
+                if waiting and worker.row is None:
                     index = _next_task(worker, pool, waiting, tasks)
                     task = tasks[index]
                     limit = limits.seconds(task, costs[index]) if task.is_third_party else None
                     worker.submit(index, limit, kinds[task.key.kind], task, saved(index))
-                    if len(worker.rows) == 1:
-                        begun(task)
+                    begun(task)
             _wait(pool)
             for worker in pool:
                 worker.greet()
-                if not worker.rows:
+                if worker.row is None:
                     continue
-                index, *behind = (row for row, _ in worker.rows)
+                index = worker.index
                 try:
                     row = _finished_row(worker, tasks[index], costs[index], limits)
                 except BrokenProcessPool:
                     ending = worker.ending
                     worker.end()
-                    waiting.extendleft(reversed(behind))
                     deaths[index] += 1
                     if deaths[index] < _MOST_DEATHS:
                         waiting.appendleft(index)
@@ -239,8 +216,6 @@ def in_processes(
                         raise died(tasks[index], deaths[index]) from None
                     row = ended_its_process(tasks[index], deaths[index], ending)
                 if row is not None:
-                    if worker.rows:
-                        begun(tasks[worker.rows[0][0]])
                     yield index, row
                     yield from limits.not_asked(waiting, tasks)
     finally:
@@ -309,15 +284,14 @@ def in_limited_process(kind: MeasuredKind, task: Task, limit: float) -> tuple[Ro
 
 def _wait(pool: Sequence[_Worker]) -> None:
     """Waits until a process has started, a row is done, or a limit is reached."""
-    futures = [future for worker in pool if worker.rows for future in worker.awaited()]
-    left = [worker.left for worker in pool if worker.rows]
+    futures = [future for worker in pool if worker.row for future in worker.awaited()]
+    left = [worker.left for worker in pool if worker.row]
     wait(futures, min((max(seconds, 0.0) for seconds in left if seconds is not None), default=None), FIRST_COMPLETED)
 
 
 def _finished_row(worker: _Worker, task: Task, cost: float, limits: RowLimits) -> Row | None:
-    """The row of a worker's first task, finished or stopped; None while it runs.  Raises BrokenProcessPool."""
-    _, future = worker.rows[0]
-    if future.done():
+    """The row of a worker's task, finished or stopped; None while it runs.  Raises BrokenProcessPool."""
+    if (future := worker.row) is not None and future.done():
         name, error = task.key.subject.name, future.exception()
         if error is None:
             row = future.result()
@@ -330,7 +304,7 @@ def _finished_row(worker: _Worker, task: Task, cost: float, limits: RowLimits) -
             row = failed(task, f"measuring {name} failed: {type(error).__name__}: {said(error)}")
             worker.end()
         limits.took(task, cost, row, worker.seconds())
-        worker.finish()
+        worker.row = None
         return row
     if worker.left is None or worker.left > 0:
         return None
