@@ -534,6 +534,10 @@ def _mjcf_body(name: str, body: Element, parts: _Parts, frames: _MjcfFrames) -> 
             raise InputError(f"{numbers.where}: boundinertia raises a principal moment.", "Give diaginertia and quat.")
         if not any(six[3:]):
             six = (max(six[0], least), max(six[1], least), max(six[2], least), *_ZERO)
+    no_body = inertia_slips.is_positive(rows(six)) and not inertia_slips.has_second_moments(rows(six))
+    if no_body and frames.settings.get("balanceinertia") == "true":  # as MuJoCo does
+        mean = (six[0] + six[1] + six[2]) / 3
+        six = (mean, mean, mean, *_ZERO)
     axes, centre = frames.pose(numbers, inertial, around)
     balls = [pair for pair in parts if frames.attributes(pair[0]).get("type") == "ball"]
     joint = frames.pose(numbers, *balls[0])[1] if balls else None

@@ -464,6 +464,11 @@ def in_sdf(
 # As MuJoCo 4.0.0 and Drake 1.56 read them: centre of mass from the pivot, mass, I11 I22 I33, gravity.
 READ = {
     "bounds": (in_mjcf(BALL, '<compiler boundmass="5" boundinertia=".045"/>'), "0.1 0 0.2 5 0.045 0.05 0.045 9.81"),
+    "balanced": (
+        in_mjcf(BALL.replace("0.04", "0.1"), '<compiler balanceinertia="true"/>'),
+        "0.1 0 0.2 2 0.06 0.06 0.06 9.81",
+    ),
+    "not balanced": (in_mjcf(BALL, '<compiler balanceinertia="true"/>'), "0.1 0 0.2 2 0.03 0.05 0.04 9.81"),
     "joint in a frame": (
         in_mjcf(f'<frame pos="0 0 1"><joint type="ball"/></frame>{BALL}'),
         "0.1 0 -0.8 2 0.03 0.05 0.04 9.81",
