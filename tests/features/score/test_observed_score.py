@@ -88,6 +88,18 @@ def test_a_sample_counts_once_however_often_it_is_evaluated(monkeypatch, part: s
     assert len(calls) > 20
 
 
+def test_the_length_of_a_quaternion_is_off_by_what_is_said(tmp_path: Path) -> None:
+    longer = conventions.columns(quaternion=lambda q: q * 1.04)
+    (told,) = scored(conventions.as_csv(*BODY, Written(("quaternion",)), longer), tmp_path).diagnoses
+    assert (told.kind, told.numbers["off"]) == ("quaternion_length", "0.0400")
+
+
+def test_an_array_in_the_place_of_a_direction_is_said() -> None:
+    start = ht.State((0, 0, 1), attitude=ht.Attitude.quaternion(1, 0, 0, 0))
+    with pytest.raises(InputError, match="quaternion must be text"):
+        ht.score([1], top=ht.HeavyTop((1, 1, 1), 0, (0, 0, 0)), start=start, quaternion=[[1, 0, 0, 0]])
+
+
 def test_the_sign_of_a_quaternion_does_not_matter(tmp_path: Path) -> None:
     signs = iter([1, -1] * 40)
     flip = conventions.columns(quaternion=lambda q: q * next(signs))

@@ -241,6 +241,9 @@ def score(
     body = top if isinstance(top, Body) else arguments.is_a(top, HeavyTop, "top")
     about, instants = arguments.system(system, body), list(check_times(times))
     names = arguments.text(name, "name"), arguments.text(integrator, "integrator")
+    words = {"quaternion_order": quaternion_order, "quaternion": quaternion, "matrix": matrix, "angles": angles}
+    words |= {"sequence": sequence, "up": up}
+    words = {word: arguments.text(value, word) for word, value in words.items()} | {"sequence": sequence.upper()}
     given = None if states is None else _rows(states, "states")  # read once: it may be an iterator
     flag = bool(arguments.flag(normalize, "normalize"))
     arrays = columns(
@@ -259,9 +262,6 @@ def score(
     if given is not None and set(arrays) == {"omega", "gamma"} and isinstance(body, HeavyTop) and not state.attitude:
         _, state = arguments.motion(body, state)
         return scored(of_arrays(body, state, about, instants, given, form, *names), needed)
-    words = {"quaternion_order": quaternion_order, "quaternion": quaternion, "matrix": matrix, "angles": angles}
-    words |= {"sequence": sequence, "up": up}
-    words = {word: arguments.text(value, word) for word, value in words.items()} | {"sequence": sequence.upper()}
     where = None if point is None else vector(point, "point")
     said = Convention(**words, pivot=vector(pivot, "pivot"), point=where)
     if "euler" in arrays and not said.sequence:

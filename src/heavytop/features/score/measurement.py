@@ -144,7 +144,8 @@ def _in_axes_of_file(samples: Observations) -> list[tuple[Any, ...]]:
 def _lengths(observed: Observed, times: Sequence[Fraction], precision: Precision) -> Diagnosis | None:
     """The diagnosis of quaternions whose length differs from 1 by more than rounding."""
     rows = observed.columns.get("quaternion", [])
-    off = [abs(dot(row, row) + row[3] ** 2 - 1) / 2 for row in rows]
+    squares = [dot(row, row) + row[3] ** 2 for row in rows]
+    off = [abs(square - 1) / (1 + Fraction(math.sqrt(square))) for square in squares]
     if not off or max(off) <= 2**10 * precision.eps:
         return None
     worst = max(range(len(off)), key=lambda row: off[row])
