@@ -160,10 +160,7 @@ def count(value: int | None, what: str) -> int | None:
 
 def steps(value: int | None) -> int | None:
     """A limit of steps, or None."""
-    number = None if value is None else as_integer(value, "step_limit")
-    if number is not None and number < 1:
-        raise refusal("step_limit", "at least 1", quoted(number), "Give 1 or more.")
-    return None if number is None else min(number, _MOST)
+    return count(value, "step_limit")
 
 
 def limit(value: Number | None, what: str) -> str | None:

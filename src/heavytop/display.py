@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import Any
+from typing import Any, TypeVar, overload
 
+_T = TypeVar("_T")
 _MOST = 12
 _ENDS = 5
 
@@ -33,24 +34,23 @@ class Tabular:
         return self._table().html()
 
 
-class LazyLines(Sequence[Sequence[str]]):
-    """The lines of a long table, each made when it is shown.
+class Lazy(Sequence[_T]):
+    """A sequence of ``size`` items, each made by ``make`` from its index on access; none is stored."""
 
-    count: of the lines.  line: returns the texts of the line with a given index.
-    """
-
-    def __init__(self, count: int, line: Callable[[int], Sequence[str]]) -> None:
-        self.indices, self.line = range(count), line
+    def __init__(self, size: int, make: Callable[[int], _T]) -> None:
+        self._indices = range(size)
+        self._make = make
 
     def __len__(self) -> int:
-        return len(self.indices)
+        return len(self._indices)
 
-    def __getitem__(self, index: Any) -> Any:
-        selected = self.indices[index]
-        return self.line(selected) if isinstance(selected, int) else [self.line(item) for item in selected]
-
-    def __iter__(self) -> Iterator[Sequence[str]]:
-        return map(self.line, self.indices)
+    @overload
+    def __getitem__(self, index: int) -> _T: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[_T]: ...
+    def __getitem__(self, index: int | slice) -> _T | list[_T]:
+        picked = self._indices[index]
+        return self._make(picked) if isinstance(picked, int) else [self._make(index) for index in picked]
 
 
 @dataclass(frozen=True, slots=True)

@@ -544,27 +544,15 @@ def notice(name: str) -> str:
     return f"the integrator {name} is called {INTEGRATORS[name]} now" if name in INTEGRATORS else ""
 
 
-def in_document(part: Any) -> set[str]:
-    """The former names in ``integrator = "NAME"`` of a plan's document, at any depth."""
-    if isinstance(part, list):
-        return set().union(*map(in_document, part))
-    if not isinstance(part, dict):
-        return set()
-    integrator = part.get("integrator")
-    names = {integrator} if isinstance(integrator, str) and integrator in INTEGRATORS else set()
-    return names.union(*(in_document(item) for item in part.values()))
-
-
-def of_document(part: Any) -> Any:
-    """The document of a plan with current names."""
-    if isinstance(part, list):
-        return [of_document(item) for item in part]
-    if not isinstance(part, dict):
-        return part
-    document = {name: of_document(item) for name, item in part.items()}
-    if isinstance(integrator := part.get("integrator"), str):
-        document["integrator"] = current(integrator)
-    return document
+def take_former(part: Any) -> set[str]:
+    """Replace the former names in ``integrator = "NAME"`` of a plan's document, at any depth; returns them."""
+    parts = part if isinstance(part, list) else part.values() if isinstance(part, dict) else ()
+    names: set[str] = set().union(*map(take_former, parts))
+    integrator = part.get("integrator") if isinstance(part, dict) else None
+    if isinstance(integrator, str) and integrator in INTEGRATORS:
+        part["integrator"] = current(integrator)
+        names.add(integrator)
+    return names
 
 
 def of_plan(plan: dict[str, str]) -> dict[str, str]:

@@ -12,7 +12,7 @@ from functools import lru_cache
 import pytest
 
 from heavytop.cases import CASES
-from heavytop.display import LazyLines, TitledTable
+from heavytop.display import Lazy, TitledTable
 from heavytop.integrate.heyoka import motions
 from heavytop.integrate.heyoka.motions import first_steps, propagate
 from heavytop.integrate.multiword import motions as multiword_motions
@@ -177,7 +177,7 @@ def test_the_first_and_last_rows_alone_are_formatted() -> None:
         asked.append(place)
         return [str(place)]
 
-    text = TitledTable("many", ["n"], LazyLines(10**6, line)).text()
+    text = TitledTable("many", ["n"], Lazy(10**6, line)).text()
     assert asked == [*range(5), *range(10**6 - 5, 10**6)]
     assert "999990 more" in text
     calls = []

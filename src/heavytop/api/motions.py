@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from heavytop import arguments
 from heavytop.arguments import Number, Numbers
-from heavytop.display import LazyLines, Tabular, TitledTable, plural
+from heavytop.display import Lazy, Tabular, TitledTable, plural
 from heavytop.errors import InputError, meant, prefixed, quoted, refusal
 from heavytop.exact.bodies import Finder
 from heavytop.exact.catalogue import find
@@ -405,7 +405,7 @@ class Propagated(Tabular):
         flat = self.to_numpy().reshape(-1, 6)
         said = "all reached every time" if self.succeeded else "not all times were reached"
         times = numpy.atleast_1d(self.times)
-        lines = LazyLines(len(flat), lambda i: (str(float(times[i % len(times)])), *map(str, flat[i])))
+        lines = Lazy(len(flat), lambda i: (str(float(times[i % len(times)])), *map(str, flat[i])))
         title = f"{plural(len(self.steps) if isinstance(self.steps, tuple) else 1, 'motion')}: {said}"
         return TitledTable(title, ("t", *NAMES), lines)
 

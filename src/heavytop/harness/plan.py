@@ -21,12 +21,13 @@ import msgspec
 
 from heavytop import records
 from heavytop.cases import CASES, Case, case, named_bodies, require_possible
+from heavytop.display import Lazy
 from heavytop.errors import InputError, invalid, meant, nearest, prefixed, quoted, refusal
 from heavytop.exact.resolved import resolve
 from heavytop.files import read_whole, readable
 from heavytop.harness import BUILT_IN, OF_FEATURES
 from heavytop.harness.rows import Kinds, PlanTable, Task
-from heavytop.harness.sweeps import Lazy, Sweep
+from heavytop.harness.sweeps import Sweep
 from heavytop.integrate.registry import IntegratorSource, command_of, commands_in, is_third_party, named, seconds_of
 from heavytop.integrate.registry import known as known_integrators
 from heavytop.integrate.registry import require as require_integrator
@@ -181,7 +182,7 @@ def _as_written(key: str, value: object) -> Any:
 def former(name: str) -> set[str]:
     """The former names of integrators in the plan of that file; none where it cannot be read a second time."""
     try:
-        return records.in_document(document_of(Path(name).read_text("utf-8"))) if Path(name).is_file() else set()
+        return records.take_former(document_of(Path(name).read_text("utf-8"))) if Path(name).is_file() else set()
     except (OSError, ValueError, RecursionError):
         return set()
 
@@ -248,6 +249,7 @@ def with_integrator(plan: Plan, integrator: str | IntegratorSource) -> Plan:
 
 def of_document(document: dict[str, Any], kinds: Kinds) -> Plan:
     """The plan in a TOML document; raises ValidationError with the place of an unknown key, kind or impossible type."""
+    records.take_former(document)
     tables = {kind.name: kind.table for kind in kinds.values() if kind.table is not None}
     _require_kinds(document, "measure", tables)
     _require_kinds(document, "sweep", {str(sweep_class.__struct_config__.tag) for sweep_class in get_args(Sweep)})
@@ -255,7 +257,7 @@ def of_document(document: dict[str, Any], kinds: Kinds) -> Plan:
     any_table = reduce(or_, tables.values())
     measure = ("measure", list[any_table])  # type: ignore[valid-type]
     plan_type = msgspec.defstruct("Plan", [measure], bases=(Plan,), kw_only=True)
-    plan: Plan = msgspec.convert(records.of_document(document), cast(type[Plan], plan_type))
+    plan: Plan = msgspec.convert(document, cast(type[Plan], plan_type))
     return plan
 
 
@@ -274,7 +276,7 @@ def _require_kinds(table: dict[str, Any], section: str, known: Collection[str]) 
 
 def _require_keys(document: dict[str, Any], tables: Mapping[str, type[PlanTable]]) -> None:
     """Raises ValidationError for a [[measure]] with a key unknown to its kind, with the known keys."""
-    entries = records.of_document(document).get("measure")
+    entries = document.get("measure")
     for index, entry in enumerate(entries if isinstance(entries, list) else []):
         table = tables.get(entry.get("kind", "")) if isinstance(entry, dict) else None
         keys = {"kind"} if table is None else {"kind", *table.__struct_encode_fields__}

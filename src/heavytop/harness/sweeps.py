@@ -8,12 +8,13 @@ from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from math import prod
 from random import Random as Generator
-from typing import Any, Literal, TypeVar, overload
+from typing import Any, Literal
 
 import msgspec
 import numpy
 
 from heavytop.cases import Case, require_possible
+from heavytop.display import Lazy
 from heavytop.errors import InputError, prefixed
 from heavytop.precision import exact, shown, vector
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, system, system_of
@@ -21,26 +22,6 @@ from heavytop.top.heavy_top import HeavyTop, State
 
 _MOST = 1_000_000
 _AXES = ("inertia", "weight", "centre", "omega", "gamma", "rotor")
-_T = TypeVar("_T")
-
-
-class Lazy(Sequence[_T]):
-    """A sequence of ``size`` items, each made by ``make`` from its index on access; none is stored."""
-
-    def __init__(self, size: int, make: Callable[[int], _T]) -> None:
-        self._indices = range(size)
-        self._make = make
-
-    def __len__(self) -> int:
-        return len(self._indices)
-
-    @overload
-    def __getitem__(self, index: int) -> _T: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[_T]: ...
-    def __getitem__(self, index: int | slice) -> _T | list[_T]:
-        picked = self._indices[index]
-        return self._make(picked) if isinstance(picked, int) else [self._make(index) for index in picked]
 
 
 class Strict(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):

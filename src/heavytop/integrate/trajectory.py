@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy
 from numpy.typing import NDArray
 
-from heavytop.display import LazyLines, Tabular, TitledTable, path_picture, plural
+from heavytop.display import Lazy, Tabular, TitledTable, path_picture, plural
 from heavytop.errors import InputError
 from heavytop.precision import (
     DOUBLE,
@@ -553,7 +553,7 @@ class Trajectory(Tabular, InSpace):
         def line(index: int) -> list[str]:
             return [decimal_text(self.times[index], _SHOWN), *(_shown(value, digits) for value in self.states[index])]
 
-        rows = LazyLines(min(len(self.times), len(self.states)), line)
+        rows = Lazy(min(len(self.times), len(self.states)), line)
         steps = plural(self.steps, "step") + (f" of order {self.order}" if self.order else "")
         title = f"{self.problem.system.name} in {precision.name} by {self.integrator}: {self.outcome.message}, {steps}"
         names = NAMES if self.problem.xi is None or self.attitude is not None else (*NAMES, "ξ1", "ξ2", "ξ3")

@@ -19,7 +19,7 @@ import numpy
 from flint import Ordering, fmpq, fmpq_mpoly_ctx, fmpq_series
 from numpy.typing import NDArray
 
-from heavytop.display import LazyLines, Tabular, TitledTable, plural
+from heavytop.display import Lazy, Tabular, TitledTable, plural
 from heavytop.errors import InputError, quoted
 from heavytop.exact.flint.balls import radius_text, rational
 from heavytop.integrate.trajectory import Outcome, Problem
@@ -568,7 +568,7 @@ class Section(Tabular):
         points = plural(sum(map(len, self.events)), "point")
         title = f"Poincaré section {first.function} of {plural(len(self), 'motion')}, {points}"
         notes = [] if self.on_one_level else ["the starts are on different levels of energy or M·γ"]
-        return TitledTable(title, ("start", "points", "energy", "M·γ"), LazyLines(len(self), line), notes)
+        return TitledTable(title, ("start", "points", "energy", "M·γ"), Lazy(len(self), line), notes)
 
 
 _EXPLAINED = {
@@ -588,7 +588,7 @@ def _listed(
         time, *state = (decimal_text(value, min(_SHOWN, digits)) for value in exactly)
         return [time, "rises" if events.directions[index] > 0 else "falls", *state]
 
-    return TitledTable(title, ("t", "sign", *NAMES), LazyLines(len(events), line), notes)
+    return TitledTable(title, ("t", "sign", *NAMES), Lazy(len(events), line), notes)
 
 
 def arrays(times: Sequence[Any], states: Sequence[Any], directions: Sequence[int]) -> tuple[Array, Array, Array]:

@@ -12,6 +12,7 @@ import msgspec
 import numpy
 
 from heavytop.cases import Case
+from heavytop.display import Lazy
 from heavytop.errors import InputError, quoted, refusal
 from heavytop.features.survey.charts import survey_charts
 from heavytop.features.survey.gathered import DATA, FILE, chunk_bytes, gathered, of_motions, write
@@ -20,7 +21,7 @@ from heavytop.features.survey.measured import Chunk, Drawn, chunks, drawn, measu
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.plan import positive, uniform
 from heavytop.harness.rows import Find, PlanTable, Task, computed, exact_row
-from heavytop.harness.sweeps import Lazy, Sweep
+from heavytop.harness.sweeps import Sweep
 from heavytop.integrate.trajectory import Outcome
 from heavytop.kind import Kind
 from heavytop.precision import DOUBLE, EXTENDED, exact, parse, rounded

@@ -18,9 +18,10 @@ import numpy
 from numpy.typing import NDArray
 
 from heavytop.cases import Case
+from heavytop.display import Lazy
 from heavytop.errors import Contradiction, PeerFailed
 from heavytop.exact.flint.balls import midpoint, radius
-from heavytop.harness.sweeps import Lazy, Random, Sweep
+from heavytop.harness.sweeps import Random, Sweep
 from heavytop.integrate.heyoka.lanes import states_on_a_grid
 from heavytop.integrate.multiword.lanes import double_double_states, propagate_multiword_ensemble
 from heavytop.integrate.registry import Integrator, described
