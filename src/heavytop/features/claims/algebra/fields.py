@@ -151,6 +151,7 @@ class Field:
         for fact, strict in facts:
             if fact.free_symbols & solved:
                 self.tower.declare(self.enter(fact), strict=strict)
+        self.tower.signs.declare_largest_terms()
 
     def _declare_greater(self, symbol: sympy.Symbol, bound: sympy.Expr) -> None:
         """Assumes symbol = bound + excess with a generator excess > 0."""

@@ -152,6 +152,14 @@ class Signs:
             self._declare_each(open_factors, known)
         self._known.clear()
 
+    def declare_largest_terms(self) -> None:
+        """The one term that may have the sign of its fact has it: where 4ac - b² > 0, ac > 0."""
+        for fact, sign in [*self._facts]:
+            terms = [self._ring.context.from_dict({m: c}) for m, c in fact.to_dict().items()] if sign.value else []
+            candidates = [term for term in terms if self.of(term).value != -sign.value]
+            if len(candidates) == 1 < len(terms):
+                self.declare(candidates[0], sign)
+
     def _declare_each(self, factors: list[fmpq_mpoly], known: Sign) -> None:
         """Two factors with a product > 0 have the sign of their sum; with a product < 0, of their difference."""
         if len(factors) != 2 or not (known.value and known.strict):
@@ -319,7 +327,7 @@ class Signs:
         x = sympy.Symbol("x")
         polynomial = sympy.Poly(sum(as_fraction(c) * x ** int(m[index]) for m, c in p.to_dict().items()), x)
         if polynomial.degree() == 1:
-            return self._line(polynomial, low, high)
+            return self._line(polynomial, low, high).also(Sign(0, self._by_other_of_circle(index, polynomial)))
         if polynomial.count_roots(low, high):
             return UNKNOWN
         inside = low if low is not None else high if high is not None else sympy.Integer(0)
@@ -337,6 +345,11 @@ class Signs:
         if highest is not None and highest <= 0:
             return Sign(-1, bool(highest < 0))
         return UNKNOWN
+
+    def _by_other_of_circle(self, index: int, line: Any) -> bool:
+        """Whether the line is 0 at ±1 alone, where a sine or cosine has no value, as the other one is never 0."""
+        others = (pair[1 - pair.index(index)] for pair in self.circles.items() if index in pair)
+        return abs(line.eval(0)) == abs(line.LC()) and any(self._by_facts(self._ring.gens[i]).strict for i in others)
 
     def _range(self, index: int) -> tuple[Any, Any]:
         """The closed interval of a generator; None for no bound."""
