@@ -259,11 +259,18 @@ def test_arrays_of_numpy_are_a_table(tmp_path: Path) -> None:
         assert digits(path) > 13
 
 
-@pytest.mark.parametrize("name", ["empty.npz", "zero.npy", "cut.npz", "none.npy", "cut.parquet", "ragged.parquet"])
+@pytest.mark.parametrize(
+    "name", ["empty.npz", "zero.npy", "cut.npz", "spoilt.npz", "none.npy", "cut.parquet", "ragged.parquet"]
+)
 def test_arrays_without_rows_or_cut_short_are_refused(name: str, tmp_path: Path) -> None:
     path = tmp_path / name
     if name == "empty.npz":
         numpy.savez(path)
+    elif name == "spoilt.npz":
+        numpy.savez_compressed(path, t=TIMES, omega=omegas())
+        content = bytearray(path.read_bytes())
+        content[60] ^= 255
+        path.write_bytes(content)
     elif name == "zero.npy":
         numpy.save(path, numpy.zeros((0, 7)))
     elif name == "ragged.parquet":
@@ -299,6 +306,9 @@ def test_repeated_times_are_one_row_or_an_error_and_a_reset_ends_the_log(tmp_pat
     assert digits(path, plain([*lines[:5], lines[4], *lines[5:]])) > 13
     other = lines[4].replace(",0.", ",-0.", 1)
     assert "Lines 12 and 13 have the same time and differ" in refusal(path, plain([*lines[:5], other, *lines[5:]]))
+    stamps = [f"{1700000000 + time:.1f},{line.split(',', 1)[1]}" for time, line in zip(TIMES, lines, strict=True)]
+    stamped = plain([*stamps[:5], stamps[4], *stamps[5:8], *stamps[:3]]).replace("t,qw", "timestamp,qw")
+    assert digits(path, stamped) > 13
     path.write_text(plain([*lines[:8], *lines[:3]]))
     shown = heavytop("score", path)
     assert shown.returncode == 0

@@ -580,8 +580,9 @@ def _turned(samples: Observations, simulated: SimulatedMotion) -> Iterator[Row]:
 
 
 def _angle(matrix: Array) -> str:
-    cosine = max(-1.0, min(1.0, (float(numpy.trace(matrix)) - 1) / 2))
-    return f"{numpy.degrees(numpy.arccos(cosine)):.6g}"
+    sine = numpy.linalg.norm(matrix - matrix.T) / 8**0.5  # of which the cosine knows half the digits
+    angle = numpy.degrees(numpy.arctan2(sine, (numpy.trace(matrix) - 1) / 2))
+    return f"{round(float(angle), 6):.6g}"
 
 
 def _scaled(samples: Observations, simulated: SimulatedMotion) -> Iterator[Row]:

@@ -20,7 +20,7 @@ from flint import arb, fmpq
 from heavytop.errors import InputError, quoted
 from heavytop.exact.flint.balls import midpoint, working_precision
 from heavytop.extras import require_extra
-from heavytop.precision import decimal_text, exact_text
+from heavytop.precision import decimal_text
 
 NAMES = "Call quaternions qw,qx,qy,qz, Ω omega1,omega2,omega3, matrices R11 to R33, times t."
 TUM = ("timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
@@ -187,7 +187,7 @@ def with_one_time(
     note = f"times are counted from the first row, {decimal_text(first, 20)}{_kept([row[index] for row in cells])}"
     for row in cells:
         if (value := number(row[index])) is not None:
-            row[index] = exact_text(value - first)
+            row[index] = decimal_text(value - first, 40)
     return names, cells, [note]
 
 
@@ -358,7 +358,7 @@ def of_ephemeris(text: str) -> str:
     system = meta.get("TIME_SYSTEM", "UTC").upper()
     start = _epoch(meta.get("START_TIME") or rows[0][0], system) if rows else Fraction(0)
     lines.append(",".join(["timestamp", *order]))
-    lines += [",".join([exact_text(_epoch(row[0], system) - start), *row[1 : len(order) + 1]]) for row in rows]
+    lines += [",".join([decimal_text(_epoch(row[0], system) - start, 40), *row[1 : len(order) + 1]]) for row in rows]
     return "\n".join(lines)
 
 
@@ -417,6 +417,8 @@ def of_arrays(content: bytes, suffix: str) -> str:
 
 
 def _of_numpy(content: bytes) -> dict[str, Any]:
+    import zlib
+    from tokenize import TokenError
     from zipfile import BadZipFile
 
     import numpy
@@ -425,7 +427,7 @@ def _of_numpy(content: bytes) -> dict[str, Any]:
         loaded = numpy.load(BytesIO(content), allow_pickle=False)
         names = loaded.files if hasattr(loaded, "files") else loaded.dtype.names
         return {"": loaded} if names is None else {name: loaded[name] for name in names}
-    except (ValueError, EOFError, BadZipFile) as error:
+    except (ValueError, EOFError, BadZipFile, zlib.error, TokenError, RuntimeError, MemoryError) as error:
         raise InputError(f"A log must be an array: {error}.", "Save plain numbers, without pickle.") from None
 
 
