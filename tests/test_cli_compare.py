@@ -189,7 +189,9 @@ def test_a_history_shows_what_changed_or_what_is_asked_for(reports, heavytop, ca
     assert [track["metric"] for track in document["tracks"]] == ["break_away_time"]
     assert "break_away_time" in Path("h.html").read_text()
     assert heavytop("history", "old", "same") == 0
-    assert "Nothing changed" in capsys.readouterr().out
+    assert "Nothing changed. --metric" in capsys.readouterr().out
+    assert heavytop("history", "old", "same", "--case", "none") == 0
+    assert "Nothing changed, or nothing matches." in capsys.readouterr().out
 
 
 @pytest.mark.slow

@@ -158,6 +158,9 @@ def gate_moves(folder: Path) -> None:
     kept = sorted(each.name for each in (folder / ".heavytop" / "baseline").iterdir())
     assert kept == ["report.json", "report.json.sha256"]
     (folder / "mine.py").write_text(text)
+    (folder / ".heavytop" / "baseline" / "report.json.sha256").unlink()
+    done = in_process.heavytop("gate", "--workers", "1", cwd=folder)
+    assert (done.returncode, "baseline has no report.json.sha256" in done.stderr) == (0, True)
     (folder / ".heavytop" / "new" / "notes").touch()
     code, said = gate()
     assert (code, "already contains" in said) == (2, True)

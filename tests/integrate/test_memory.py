@@ -249,6 +249,12 @@ def test_what_lies_between_steps_is_tried_beside_the_order(between, order, verdi
     assert (found.verdict, "between steps" in found.text) == (verdict, True)
 
 
+def test_a_tolerance_that_changes_nothing_is_said() -> None:
+    deaf = double_peer("deaf", 5, lambda given: dopri(cubic)(replace(given, control=1e-7)))
+    found = judged(of_callable(deaf), "between steps")
+    assert (found.verdict, "perhaps the tolerance is ignored" in found.text) == ("note", True)
+
+
 def test_a_count_that_explains_no_error_is_said_and_no_failure() -> None:
     """Many steps too many make single steps short: a row says so, and accuses nobody."""
     honest = double_peer("honest", 5, solve := dopri(cubic))

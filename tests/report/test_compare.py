@@ -10,7 +10,7 @@ import heavytop as ht
 from heavytop.errors import InputError
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
-from heavytop.records import Against, Data, Law, Metric, Row, Series
+from heavytop.records import Against, Data, Law, Metric, Quantity, Row, Series
 from heavytop.report.compare.noise import Policy, Rule, Timings
 from heavytop.report.compare.verdicts import judge_seconds
 from support.reports import compare, replace, store
@@ -283,6 +283,7 @@ def test_a_missing_report_and_a_row_twice_are_refused(tmp_path: Path) -> None:
         {"metrics": {"drift_energy_max": Metric("unresolved", None, "error", "-1e-12")}},
         *({"series": {"drift_energy": Series(times, ["1e-12"])}} for times in (["1", "2"], ["soon"])),
         {"series": {"drift_energy": Series(["1"], ["little"])}},
+        {"series": {"drift_energy": Series(["1"], ["-1e-13"], Quantity("drift", "energy"))}},
         *({"laws": {"energy": Law("t", 8, *numbers)}} for numbers in ((1.0, 1.1, 0.9), (1.0, 0.9), (None, 0.9, 1.1))),
         *({"laws": {"energy": Law("t", 8, 1.0, **said)}} for said in ({"detects": "-1e-19"}, {"lost_at": "soon"})),
         {"laws": {"energy": Law("t", -8, 1.0)}},

@@ -102,6 +102,11 @@ def test_a_limit_alone_is_named_and_is_no_loss_of_order() -> None:
     assert said[0].endswith(", above its limit; also on 1 other row.")
 
 
+def test_a_row_that_no_sentence_names_is_no_other_row() -> None:
+    old = rk5(metrics={DIGITS: error("1e-9"), "drift_energy_max": error("1e-9")})
+    assert found([old], [replace(old, metrics={DIGITS: error("1e-9")})]) == ["1 row changed."]
+
+
 def test_rows_of_two_versions_are_one_row_and_both_versions_are_said() -> None:
     plain = {"3.3": [work(10, "1e-4"), work(100, "1e-8")], "4.0": [work(10, "1e-4"), work(100, "1e-6")]}
     old, new = ([replace(row, key=row.key.of_version(v)) for row in rows] for v, rows in plain.items())

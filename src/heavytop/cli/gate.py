@@ -47,6 +47,7 @@ def gate(
     from heavytop.harness.plan import former
     from heavytop.report.compare.noise import load
     from heavytop.report.render.comparison import comparison
+    from heavytop.report.store.store import DIGEST
 
     trusted, fresh, rules = absolute(baseline), absolute(out), policy_of(plan, policy)
     if fresh.resolve() == trusted.resolve():
@@ -67,6 +68,8 @@ def gate(
     say_former({integrator} | former(plan))
     for warning in planned.warnings:
         say(f"warning: {warning}")
+    if not bless and not (trusted / DIGEST).exists():
+        say(f"warning: {baseline} has no {DIGEST}: edits of it are not noticed. --bless writes one.")
     ended = measured(planned)
     try:
         require_baseline(trusted, command_line)

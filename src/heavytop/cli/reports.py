@@ -101,7 +101,8 @@ def history(
     if json:
         print_json(history_of_reports.to_json())
     else:
-        show_on_terminal(history_text(history_of_reports.names, history_of_reports.tracks))
+        selected = bool(metric) or case != "*"
+        show_on_terminal(history_text(history_of_reports.names, history_of_reports.tracks, selected=selected))
     return ExitCode.GOOD
 
 

@@ -385,6 +385,9 @@ class _Contract:
         if (control := registry.control_name(self.which)) not in _CONTROLS:
             raise _Note("Not tested: it has neither step nor tolerance.")
         coarse, fine = (self._between(control, value) for value in _CONTROLS[control])
+        if coarse == fine and fine.between:
+            values = " and ".join(f"{float(value):.2g}" for value in _CONTROLS[control])
+            raise _Note(f"The errors with a {control} of {values} are equal: perhaps the {control} is ignored.")
         if fine.between <= max(_DENSE_RATIO * fine.ends, _RESTART_EPS * self.precision.eps):
             return "Samples between steps are as accurate as the ends of runs."
         errors = (

@@ -262,7 +262,7 @@ def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[s
     ranked = [*ranked, *_whole_rows(changes.rows, Verdict.BETTER, Verdict.NEW)][: MOST - 1 - len(still) - len(scale)]
     named = frozenset[Identity]().union(*(group.rows for group in ranked))
     unnamed = [change for change in changes.rows if change.identity not in named]
-    end = f"{plural(len(unnamed), 'other row')} changed." if unnamed else "No other row changed."
+    end = f"{plural(len(unnamed), 'other row' if ranked else 'row')} changed." if unnamed else "No other row changed."
     if not same and all(change.verdict in (Verdict.MISSING, Verdict.NEW) for change in changes.rows):
         keys = {msgspec.structs.replace(change.identity.key, case="") for change in changes.rows}
         names = " and ".join(_case(change.identity) for change in changes.rows)

@@ -392,6 +392,8 @@ def _of_series(series: Series) -> Iterator[str]:
     if len(series.times) != len(series.values):
         yield "not one value for each time"
     numbers = numbers_of(series)
+    if series.quantity is not None:  # an error or a drift
+        yield from (f"{number} is negative" for number in numbers if number.startswith("-"))
     try:
         log_sizes(numbers), log_sizes(tuple(series.times))
     except InputError:
