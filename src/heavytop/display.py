@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
+from itertools import groupby
 from typing import Any, TypeVar, overload
 
 _T = TypeVar("_T")
@@ -143,17 +144,16 @@ def _projected(point: Sequence[float]) -> tuple[float, float, bool]:
 
 def _lines(points: Sequence[tuple[float, float, bool]]) -> str:
     """The parts of the path on the front and, faint, on the back."""
-    parts: dict[bool, list[str]] = {True: [], False: []}
-    last: bool | None = None
-    for index, (x, y, front) in enumerate(points):
-        if front is not last and index:
-            before = points[index - 1]
-            parts[front].append(f"M{before[0]:.1f} {before[1]:.1f}")
-        parts[front].append(f"{'L' if index else 'M'}{x:.1f} {y:.1f}")
-        last = front
+    parts = {True: "", False: ""}
+    begin = 0
+    for front, run in groupby(points, lambda point: point[2]):
+        end = begin + len([*run])
+        # from the point before, on the other side
+        parts[front] += "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y, _ in points[max(begin - 1, 0) : end])
+        begin = end
     style = 'fill="none" stroke="#0072b2" stroke-width="1.3"'
     return "".join(
-        f'<path d="{"".join(parts[front])}" {style}{"" if front else faint}/>'
+        f'<path d="{parts[front]}" {style}{"" if front else faint}/>'
         for front, faint in ((False, ' stroke-opacity="0.35"'), (True, ""))
         if parts[front]
     )

@@ -25,7 +25,6 @@ from heavytop.features.score.diagnose.readings import (
     Reading,
     SimulatedMotion,
     Square,
-    errors,
     nearest_rotation,
     rates_off,
     residuals,
@@ -169,7 +168,13 @@ class ConventionSearch(Search):
         begin = begin or samples.start.begin(start or samples.said, body.tensor)
         return simulate(body, begin, tuple(float(unit * time + shift) for time in samples.times))
 
-    def errors_if(
+    def errors_if(self, samples: Observations, **supposed: Any) -> Array:
+        """The largest of :meth:`residuals_if` in each sample; infinite where a number is not finite."""
+        off = numpy.abs(self.residuals_if(samples, **supposed)).reshape(len(samples.times), -1).max(axis=1)
+        largest: Array = numpy.nan_to_num(off, nan=numpy.inf, posinf=numpy.inf)
+        return largest
+
+    def residuals_if(
         self,
         samples: Observations,
         columns: Reading | None = None,
@@ -179,7 +184,7 @@ class ConventionSearch(Search):
         mixed: tuple[str, Array] | None = None,
         **supposed: Any,
     ) -> Array:
-        """The error of each sample with another reading of columns and start, or another body.
+        """Columns less the motion, with another reading of columns and start, or another body; infinite without one.
 
         shift: the columns are those of t + shift; of Ω alone where ``rates``.  unit: they are those of unit·t.
         still: Ω is not compared.
@@ -187,9 +192,11 @@ class ConventionSearch(Search):
         begin: the start of the motion.
         """
         simulated, plain = self.simulated(samples, body=body, **supposed), self.simulated(samples) if rates else None
+        if simulated is None:
+            return numpy.full(len(samples.times), numpy.inf)
         if body is not None and samples.point is samples.body.centre:
             samples = replace(samples, point=body.centre)
-        if simulated is not None and plain is not None:
+        if plain is not None:
             in_body = numpy.einsum("nji,nj->ni", plain.rotation, simulated.omega_space)
             simulated = SimulatedMotion(
                 plain.rotation, in_body if "omega_space" in samples.columns else simulated.omega
@@ -199,7 +206,7 @@ class ConventionSearch(Search):
         if mixed is not None:
             name, matrix = mixed
             samples = replace(samples, columns={**samples.columns, name: samples.columns[name] @ matrix})
-        return errors(samples, simulated, columns or samples.said, body or samples.body)
+        return residuals(samples, simulated, columns or samples.said, body or samples.body)
 
 
 def _hypotheses(search: ConventionSearch) -> Iterator[Row]:
@@ -335,10 +342,7 @@ def _refined(
     for samples in (search.early, search.samples):
 
         def off(x: Array, samples: Observations = samples) -> Array:
-            changes = supposed(x)
-            simulated = search.simulated(samples, **changes)
-            body = changes.get("body", samples.body)
-            return numpy.full(1, numpy.inf) if simulated is None else residuals(samples, simulated, samples.said, body)
+            return search.residuals_if(samples, **supposed(x))
 
         x, here = gauss_newton(off, x, _SLIGHT, _REFINED)
         if float(numpy.linalg.norm(here)) > refused * len(here) ** 0.5:
@@ -354,22 +358,17 @@ def _turn(vector: Array) -> Array:
 
 def _early_rates(search: ConventionSearch) -> Iterator[Row]:
     """Ω alone at times that are shifted by a fitted number."""
-    samples, small = search.samples, 1e-6 / turning(search.samples.body, search.start)
-    name = next((name for name in ("omega", "omega_space") if name in samples.columns), None)
-    if name is None or len(samples.columns) < 2 or len(samples.times) < 3:
+    samples, rate = search.samples, turning(search.samples.body, search.start)
+    if not {"omega", "omega_space"} & samples.columns.keys() or len(samples.columns) < 2 or len(samples.times) < 3:
         return
-    values, _ = samples.said.angular_velocity(name, samples.columns[name])
+    last = float(abs(samples.times[-1]))
 
-    def off(x: Array) -> Array:
-        within = abs(x[0]) <= abs(samples.times[-1])
-        simulated = search.simulated(samples, shift=Fraction(x[0])) if within else None
-        return numpy.full(1, numpy.inf) if simulated is None else (getattr(simulated, name) - values).reshape(-1)
+    def shifted(x: Array) -> dict[str, Any]:
+        return {"shift": Fraction(float(numpy.clip(x[0] / rate, -last, last))), "rates": True}
 
-    x, here = gauss_newton(off, numpy.zeros(1), small, _REFINED)
-    if numpy.isfinite(here).all():
-        shift = Fraction(x[0])
-        numbers = {"shift": _signed(Fraction(decimal_text(shift, 6)))}
-        yield "omega_shifted", numbers, {"shift": shift, "rates": True, **_FITTED}
+    x, _ = _refined(search, shifted, 1, FITTED_DROP)
+    numbers = {"shift": _signed(Fraction(decimal_text(shifted(x)["shift"], 6)))}
+    yield "omega_shifted", numbers, {**shifted(x), **_FITTED}
 
 
 def _signed(shift: Fraction) -> str:

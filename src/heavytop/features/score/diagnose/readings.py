@@ -282,15 +282,6 @@ class Observations:
         return replace(self, times=times, columns={k: v[rows] for k, v in self.columns.items()})
 
 
-def errors(samples: Observations, simulated: SimulatedMotion | None, reading: Reading, body: BodyData) -> Array:
-    """The error of each sample in this reading, relative to the size of each quantity; infinite without a motion."""
-    if simulated is None:
-        return numpy.full(len(samples.times), numpy.inf)
-    off = numpy.abs(residuals(samples, simulated, reading, body)).reshape(len(samples.times), -1).max(axis=1)
-    largest: Array = numpy.nan_to_num(off, nan=numpy.inf, posinf=numpy.inf)
-    return largest
-
-
 def residuals(samples: Observations, simulated: SimulatedMotion, reading: Reading, body: BodyData) -> Array:
     """Columns in this reading less the motion, relative to the size of each quantity, sample by sample."""
     parts = [_residual(samples, simulated, reading, body, name, values) for name, values in samples.columns.items()]

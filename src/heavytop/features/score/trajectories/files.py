@@ -31,6 +31,7 @@ from heavytop.features.score.trajectories.observed import (
     require_states,
     require_system,
     rounded_state,
+    slack_of_start,
     too_many,
 )
 from heavytop.files import read_whole, readable, without_repeats
@@ -368,10 +369,6 @@ _NOT_READ |= {
     *map(key_of, SHAPES),
 }
 """Further keys of `heavytop propagate --json`."""
-_SLACK = 8
-"""γ may be off the unit sphere by so many bits of rounding."""
-_ROW_SLACK = Fraction(1, 100)
-"""γ of a row t = 0 may be off by so much: it is written with the digits of the other rows."""
 
 
 def read(path: Path, case: Case | None = None, normalize: bool = False) -> GivenTrajectory:
@@ -456,7 +453,7 @@ def _given(document: dict[str, Any], stem: str, case: Case | None, normalize: bo
     require_physical(top, start)
     precision = _precision(document, [str(value) for row in texts for value in row])
     from_row = at_start is not None and start == at_start
-    slack = _ROW_SLACK if from_row and "gamma" not in document else 2**_SLACK * precision.eps
+    slack = slack_of_start(from_row and "gamma" not in document, precision)
     if normalize:
         start = start.normalized()
     start.require_unit_gamma(slack, "Write all its digits, or use --normalize (normalize=True in Python).")

@@ -12,7 +12,7 @@ from typing import Any
 import numpy
 
 from heavytop import written_numbers
-from heavytop.arguments import MOST_STATES, bits_of, component
+from heavytop.arguments import MOST_STATES, SLACK_BITS, bits_of, component
 from heavytop.errors import InputError, prefixed, require_as_many
 from heavytop.features.score.diagnose.readings import GivenStart, Observations, Reading, body_data
 from heavytop.features.score.diagnose.samples import floats
@@ -87,8 +87,6 @@ def in_principal_axes(body: AnyBody, bits: int) -> tuple[HeavyTop, Tensor]:
 # The start of a file with attitudes: R and Ω as exact numbers, and the body with them in principal axes.
 
 
-_SLACK = 8
-"""Bits of rounding by which a quaternion or a matrix may be off."""
 _ROW_SLACK = Fraction(1, 100)
 """Tolerance of a start read from a row t = 0: it has the digits of the other rows."""
 _FAR = Fraction(1, 10)
@@ -126,13 +124,18 @@ class RawStart:
         return replace(self, values=rounded(self.values), omega=(a, b, c))
 
 
+def slack_of_start(from_row: bool, precision: Precision) -> Fraction:
+    """The amount by which γ, a quaternion or a matrix at the start may be off, from the row t = 0 or by rounding."""
+    return _ROW_SLACK if from_row else 2**SLACK_BITS * precision.eps
+
+
 def rotation(raw: RawStart, convention: Convention, precision: Precision, normalize: bool) -> Rows:
     """R in canonical axes of space, exactly orthogonal: three rows ξ, η, γ of exact numbers.
 
     normalize: take the nearest rotation, however far it is.
     Raises InputError for a quaternion off length 1, a matrix that is not a rotation, and a γ that is not its third row.
     """
-    slack = _ROW_SLACK if raw.from_row else 2**_SLACK * precision.eps
+    slack = slack_of_start(raw.from_row, precision)
     if raw.form == "gamma":
         return _of_gamma(raw, slack, normalize)
     where = "the row t = 0" if raw.from_row else "the start" if raw.form == "plain" else f"start_{raw.form}"
