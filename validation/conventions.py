@@ -448,6 +448,8 @@ PLANTED = {
     "centre in mm": Planted(("centre_unit",), keys=lambda m: {"centre": text(m.centre * 1000)}),
     "centre of the opposite side": Planted(("centre_reversed", "gravity_sign"), MATRIX,
         lambda m: {"centre": text(-m.centre)}),
+    "one component of the centre": Planted(
+        ("top",), keys=lambda m: {"centre": text(m.centre * np.array([1, 1.1, 1], dtype=REAL))}),
     "axes of the tensor permuted": Planted(
         ("inertia_axes",), keys=lambda m: {"inertia": six(m.inertia[np.ix_([1, 2, 0], [1, 2, 0])])}),
 }  # fmt: skip
