@@ -269,7 +269,7 @@ def test_arrays_without_rows_or_cut_short_are_refused(name: str, tmp_path: Path)
     elif name == "spoilt.npz":
         numpy.savez_compressed(path, t=TIMES, omega=omegas())
         content = bytearray(path.read_bytes())
-        content[60] ^= 255
+        content[55] = 7  # no kind of block
         path.write_bytes(content)
     elif name == "zero.npy":
         numpy.save(path, numpy.zeros((0, 7)))
