@@ -469,7 +469,8 @@ def _pose(numbers: _Numbers, pose: Element | None) -> Pose:
     values = numbers.read(pose.text, "pose", "0 0 0 0 0 0")
     if len(values) != count or (degrees and count == 7):
         raise InputError(
-            f"{numbers.where}: pose has {len(values)} numbers, as {quoted(kind)}{' in degrees' if degrees else ''}.",
+            f"{numbers.where}: pose has {plural(len(values), 'number')}, as {quoted(kind)}"
+            f"{' in degrees' if degrees else ''}.",
             "Give x y z roll pitch yaw as euler_rpy, or x y z and a quaternion x y z w as quat_xyzw, without degrees.",
         )
     position = (values[0], values[1], values[2])

@@ -353,6 +353,7 @@ def test_stamps_in_double_say_how_many_digits_of_the_time_they_keep(tmp_path: Pa
         ("t,desired_q_w,desired_q_x,desired_q_y,desired_q_z,q_w,q_x,q_y,q_z", "quaternion"),
         ("time_usec,Quat_q0,Quat_q1,Quat_q2,Quat_q3,qdot_w,qdot_x,qdot_y,qdot_z", "quaternion"),
         ("t,qw,qx,qy,qz,qdot_w,qdot_x,qdot_y,qdot_z,Tx,Ty,Tz,sigma_x,sigma_y,sigma_z", "quaternion"),
+        ("t,wx_body,wy_body,wz_body,omega_x_world,omega_y_world,omega_z_world", "omega omega_space"),
         ("t,wx,wy,wz,rx [deg],ry [deg],rz [deg]", "framed"),
     ],
 )  # fmt: skip

@@ -12,7 +12,7 @@ import numpy
 
 from heavytop import arguments
 from heavytop.arguments import Number, Numbers, required
-from heavytop.display import Tabular, TitledTable
+from heavytop.display import Tabular, TitledTable, plural
 from heavytop.errors import ExitCode, InputError, quoted
 from heavytop.features.score.measurement import Assessment, assess, passed
 from heavytop.features.score.text import diagnosis_text, score_report, to_json
@@ -70,7 +70,7 @@ def _rows(values: Any, name: str) -> list[list[Any]]:
         if name == "matrix" and len(numbers) == 3:
             numbers = [value for part in numbers for value in ordered(part, f"{name}[{i}]", remedy)]
         if len(numbers) != (width := WIDTHS.get(name, 6)):
-            raise InputError(f"{name}[{i}] has {len(numbers)} numbers, not {width}.", remedy)
+            raise InputError(f"{name}[{i}] has {plural(len(numbers), 'number')}, not {width}.", remedy)
         rows.append(numbers)
     return rows
 

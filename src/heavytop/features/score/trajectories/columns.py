@@ -13,6 +13,7 @@ from typing import Any
 from flint import arb
 
 from heavytop import written_numbers
+from heavytop.display import plural
 from heavytop.errors import InputError, prefixed, quoted, require_as_many
 from heavytop.exact.flint.balls import midpoint, working_precision
 from heavytop.features.score.trajectories.logs import canonical, of_rodrigues, of_rotation_vector, with_quaternion
@@ -31,8 +32,8 @@ _PATTERNS = tuple(
         ("rodrigues", r"(?:sigma|σ)([0-3])|mrp([xyz0-3])"),
         ("rotation_vector", r"(?:rotvec|rotationvector|rv)([xyz123])"),
         ("framed", r"w([xyz])"),
-        ("omega_space", r"(?:w|omega|om|ω)(?:space|world|global|inertial|s)([xyz123])"),
-        ("omega", r"(?:omega|om|ω|angularvelocity|w)(?:body|local|b)?([xyz0-3])"),
+        ("omega_space", r"(?:w|omega|om|ω)(?:(?:space|world|global|inertial|s)([xyz123])|([xyz])(?:space|world))"),
+        ("omega", r"(?:omega|om|ω|angularvelocity|w)(?:(?:body|local|b)?([xyz0-3])|([xyz])body)"),
         ("gamma", r"(?:gamma|gam|g|γ)([xyz0-3])"),
         ("position", r"(?:p|pos|position|com|centre|center|centreofmass|r|point)?([xyz])"),
     )
@@ -415,7 +416,7 @@ def listed(value: Any, what: str, count: int | None = None) -> list[Any]:
     """A list of so many members; raises InputError for anything else."""
     if not isinstance(value, list) or (count is not None and len(value) != count):
         has = (
-            f"has {len(value)} numbers: {quoted(', '.join(map(str, value)))}"
+            f"has {plural(len(value), 'number')}: {quoted(', '.join(map(str, value)))}"
             if isinstance(value, list)
             else "is not a list"
         )
@@ -567,7 +568,7 @@ def _flat(row: Any, width: int, what: str) -> list[Any]:
     if isinstance(row, list) and width == 9 and len(row) == 3 and all(isinstance(part, list) for part in row):
         row = [value for part in row for value in part]
     if not isinstance(row, list) or len(row) != width:
-        has = f"{len(row)} numbers" if isinstance(row, list) else "no list"
+        has = plural(len(row), "number") if isinstance(row, list) else "no list"
         raise InputError(f"{what} has {has}, not {width}.", "Give every row all columns.")
     return row
 

@@ -17,6 +17,7 @@ from typing import Any
 from heavytop import written_numbers
 from heavytop.arguments import MOST_STATES
 from heavytop.cases import Case
+from heavytop.display import plural
 from heavytop.errors import InputError, meant, nearest, quoted, refusal
 from heavytop.features.score.trajectories import bags, logs
 from heavytop.features.score.trajectories import columns as observed_columns
@@ -186,7 +187,7 @@ def _without_header(first: Sequence[str]) -> tuple[Sequence[str], list[str]]:
     names = logs.TUM if width == len(logs.TUM) and logs.is_unit(first[-4:]) else COLUMNS
     if width != len(names):
         raise InputError(
-            f"The header is not {','.join(COLUMNS)}: without a header Row 1 has {width} columns, not {len(COLUMNS)}.",
+            f"The header is not {','.join(COLUMNS)}: without a header Row 1 has {plural(width, 'column')}, not 7.",
             "Give a header that names the columns.",
         )
     return names, [f"columns without a header, read as {' '.join(names)}"]
@@ -273,7 +274,7 @@ def _split(body: list[str], lines: list[int], separator: str | None, width: int)
             remedy = "For decimal commas, separate the columns by semicolons." if decimal_commas else _ALL_COLUMNS
             if (not rows or width == 1) and not decimal_commas:
                 remedy = "Begin each line above the names of the columns with #, and name every column."
-            raise InputError(f"Line {number} has {len(cells)} columns, not {width}.", remedy)
+            raise InputError(f"Line {number} has {plural(len(cells), 'column')}, not {width}.", remedy)
         # where a semicolon, a tab or a space separates, a comma is the point of a decimal
         rows.append([cell.replace(",", ".") for cell in cells] if separator in (";", "\t") else cells)
     return rows
