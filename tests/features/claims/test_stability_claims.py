@@ -106,6 +106,9 @@ def test_the_sleeping_top_at_its_condition_and_beyond() -> None:
     assert on_axis(True, [*POSITIVE, fast.replace(">", ">=")], ["5", "-7"]).verdict == "undecided"
     assert on_axis(True, [*POSITIVE, fast.replace("4", "399/100")], ["5", "-7"]).verdict == "undecided"
     assert on_axis(False, [*POSITIVE, slow, "w != 0", "2*I1 > I3"], ["1/10", "-1/5"]).verdict == "holds"
+    assert on_axis(False, [slow], ["1/10", "0"]).verdict == "holds"
+    for wider in (slow.replace("<", "<="), slow.replace("4", "401/100")):
+        assert on_axis(False, [*POSITIVE, wider], ["1/10", "-1/5"]).verdict == "undecided"
     assert on_axis(True, [*POSITIVE, slow], ["1/10", "-1/5"]).verdict == "refuted"
     assert on_axis(True, POSITIVE, ["1", "-2"], up="-1").verdict == "holds"
     for stable in (True, False):

@@ -93,7 +93,8 @@ class UserStability(UserMotion):
         if self.content.stable:
             return is_stable(p, y, sign)
         a, b = quadratic_of_squares(about, p, y)
-        return any(sign(e) == 1 for e in (-a, -b, 4 * b - a**2))
+        # where b < 0 the root is not real, and the motion unstable
+        return any(sign(e) == 1 for e in (-a, -b, 4 * b - a**2, 2 * sympy.sqrt(sympy.factor(b)) - a))
 
 
 @where_provable(None)
