@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, partial
@@ -80,6 +81,7 @@ NOT_TRIED = (
 )
 _READING = "check the order of the components, the signs and how the parameters are read"
 _SAMPLING = "without other samples a run to t = 1 is right, so check the last step before each sample"
+_HEAVY_TOP = ("heavy_top",)
 _CASES = {"heavy_top": "generic", "gyrostat": "gyrostat", "heavy_gyrostat": "heavy-gyrostat"}
 
 Verdict = Literal["kept", "violated", "note"]
@@ -123,19 +125,34 @@ def check(which: str | IntegratorSource) -> list[Checked]:
 
 def _checks(which: str | IntegratorSource, process: GuardedProcess | None) -> Iterator[Checked]:
     """Each part in turn, up to a violation of one of the first or one that ended the process."""
-    for index, (name, _) in enumerate(_Contract(which).parts()):
-        checked, ended = (_part(which, index), False) if process is None else _in_child(process, which, index, name)
+    systems = _HEAVY_TOP if process is None else _declared_systems(process, which)
+    for index, (name, _) in enumerate(_Contract(which, systems).parts()):
+        part = partial(_part, which, systems, index)
+        checked, ended = (part(), False) if process is None else _in_child(process, part, name)
         yield checked
         if checked.verdict == "violated" and (ended or index < _FIRST):
             yield Checked("rest of the contract", "note", "Not tested, because of the violation above.")
             return
 
 
-def _in_child(process: GuardedProcess, which: str | IntegratorSource, index: int, name: str) -> tuple[Checked, bool]:
+def _declared_systems(process: GuardedProcess, which: str | IntegratorSource) -> Sequence[str]:
+    """The systems that a Python integrator supports; where it cannot be read its parts say why."""
+    future = process.submit(_systems, which)
+    with suppress(TimeoutError):
+        if future.exception(timeout=_PATIENCE) is None:
+            return future.result()
+    return _HEAVY_TOP
+
+
+def _systems(which: str | IntegratorSource) -> Sequence[str]:
+    return described(which).declared.systems or _HEAVY_TOP
+
+
+def _in_child(process: GuardedProcess, part: Callable[[], Checked], name: str) -> tuple[Checked, bool]:
     """One part, checked in the process, and whether that ended the process."""
     seconds = _PATIENCE_OF.get(name, _PATIENCE)
     try:
-        future = process.submit(_part, which, index)
+        future = process.submit(part)
         # an interrupt from the child was raised by the integrator
         error = future.exception(timeout=seconds)
         if error is None:
@@ -154,10 +171,10 @@ def _in_child(process: GuardedProcess, which: str | IntegratorSource, index: int
         return Checked(name, "violated", "It ended its whole process."), True
 
 
-def _part(which: str | IntegratorSource, index: int) -> Checked:
+def _part(which: str | IntegratorSource, systems: Sequence[str], index: int) -> Checked:
     """The part of the contract with that index."""
     begin_row()
-    return _judged(*_Contract(which).parts()[index])
+    return _judged(*_Contract(which, systems).parts()[index])
 
 
 _FIRST = 2
@@ -177,9 +194,12 @@ class _Note(Exception):
 
 
 class _Contract:
-    """The checks of one integrator: each method returns an observation, or raises a violation or a note."""
+    """The checks of one integrator: each method returns an observation, or raises a violation or a note.
 
-    def __init__(self, which: str | IntegratorSource) -> None:
+    systems: those that a Python integrator supports; a program declares its own.
+    """
+
+    def __init__(self, which: str | IntegratorSource, systems: Sequence[str] = _HEAVY_TOP) -> None:
         self.which = which
         self.program = which if isinstance(which, Command) else None
         names = [name for name in self.program.precisions if name != "real:BITS"] if self.program else []
@@ -187,7 +207,7 @@ class _Contract:
         if self.program and "real:BITS" in self.program.precisions:
             self.precisions = [*(self.precisions if names else []), real(237)]
         self.precision = self.precisions[0]
-        self.systems = [name for name in (self.program.systems if self.program else ("heavy_top",)) if _case(name)]
+        self.systems = [name for name in (self.program.systems if self.program else systems) if _case(name)]
         self.backward_only = bool(self.program) and "forward" not in (self.program.directions if self.program else ())
         case = CASES[_case(self.systems[0])] if self.systems else CASES["generic"]
         self.top, self.start, self.system = case.top, case.start, case.system

@@ -282,11 +282,12 @@ class Integrator:
 
 
 def _given(problem: Problem) -> tuple[HeavyTop, State]:
-    """A top and a start that round to ``problem``; raises PeerFailed for a gyrostat that is off its exact data."""
+    """A top and a start that round to ``problem``; raises Unsupported for a gyrostat that is off its exact data."""
     if problem.system is not GYROSTAT:
         return problem.top, problem.start
     if problem.given is None or Problem.of(*problem.given, problem.precision, problem.system, problem.xi) != problem:
-        raise PeerFailed("A gyrostat off its exact data is integrated side by side only, by heyoka and multiword")
+        cause = "Only heyoka and multiword integrate a gyrostat off its exact data."
+        raise Unsupported(cause, "Measure drift or work_precision.")
     return problem.given
 
 
