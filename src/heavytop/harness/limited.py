@@ -107,15 +107,16 @@ class _Worker:
 
     It serves one third-party integrator at most, which may change the state of the process.
 
-    index, row: of its task; None without one.  seconds: since it began, without the time that its process and the
-    program called by it waited for a processor.  precision: of its last task.
+    pid_future: of its start; None once it has started.  index, row: of its task; None without one.
+    seconds: since it began, without the time that its process and the program called by it waited for a processor.
+    precision: of its last task.
     """
 
     def __init__(self, kinds: Kinds) -> None:
         self._kinds = kinds
         self._process: GuardedProcess | None = None
         self._third_party = ""
-        self._pid_future: Future[int] | None = None
+        self.pid_future: Future[int] | None = None
         self._pid: int | None = None
         self.index = 0
         self.row: Future[Row] | None = None
@@ -126,7 +127,7 @@ class _Worker:
     @property
     def left(self) -> float | None:
         """Seconds left to its task; None without a limit, or while the process is starting."""
-        if self.limit is None or self._process is None or self._pid_future is not None:
+        if self.limit is None or self._process is None or self.pid_future is not None:
             return None
         return self.limit - self.seconds()
 
@@ -139,7 +140,7 @@ class _Worker:
         self.index, self.limit, self.seconds = index, limit, stopwatch(self._pid, with_children=True)
         if self._process is None:
             self._process = GuardedProcess(begin_worker, tuple(self._kinds.values()))
-            self._pid_future = self._process.submit(os.getpid)
+            self.pid_future = self._process.submit(os.getpid)
         try:
             self.row = self._process.submit(measure, kind, task, saved)
         except BrokenProcessPool:  # it died between two tasks
@@ -151,23 +152,19 @@ class _Worker:
         """How its process died."""
         return "" if self._process is None else self._process.ending
 
-    def awaited(self) -> list[Future[Any]]:
-        """The futures to wait for: the row and the process."""
-        return [future for future in (self.row, self._pid_future) if future is not None]
-
     def greet(self) -> None:
         """Guards the process group of a process that has just started, and starts the clock."""
-        if self._process is not None and self._pid_future is not None and self._pid_future.done():
+        if self._process is not None and self.pid_future is not None and self.pid_future.done():
             with suppress(BrokenProcessPool):  # the death of a process is handled with its row
-                self._pid = self._pid_future.result()
+                self._pid = self.pid_future.result()
                 self._process.guard(self._pid)
-            self._pid_future, self.seconds = None, stopwatch(self._pid, with_children=True)
+            self.pid_future, self.seconds = None, stopwatch(self._pid, with_children=True)
 
     def end(self) -> None:
         """Kills the process and its children."""
         if self._process is not None:
             self._process.end()
-        self._process = self._pid_future = self._pid = self.row = None
+        self._process = self.pid_future = self._pid = self.row = None
         self._third_party = ""
 
 
@@ -284,8 +281,9 @@ def in_limited_process(kind: MeasuredKind, task: Task, limit: float) -> tuple[Ro
 
 def _wait(pool: Sequence[_Worker]) -> None:
     """Waits until a process has started, a row is done, or a limit is reached."""
-    futures = [future for worker in pool if worker.row for future in worker.awaited()]
-    left = [worker.left for worker in pool if worker.row]
+    busy = [worker for worker in pool if worker.row]
+    futures: list[Future[Any]] = [future for worker in busy for future in (worker.row, worker.pid_future) if future]
+    left = [worker.left for worker in busy]
     wait(futures, min((max(seconds, 0.0) for seconds in left if seconds is not None), default=None), FIRST_COMPLETED)
 
 

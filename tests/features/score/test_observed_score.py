@@ -113,6 +113,7 @@ LIGHT = [
     "degrees for radians, start and columns",
     "displacement for position",
     "position of another point",
+    "one component of the centre",
 ]
 
 
