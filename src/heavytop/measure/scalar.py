@@ -214,14 +214,12 @@ def explains(rounding: Rounding, error: float) -> bool:
 
 def _roundings(numbers: Sequence[Fraction], precision: Precision) -> Iterator[Rounding]:
     worst = float(min(Fraction(1), max(map(abs, numbers))))
+    leading = 10.0 ** math.floor(math.log10(worst))  # place of the first digit
     written: list[Callable[[Fraction], Fraction]] = [lambda value: value]
     single = Rounding("single", _SINGLE, worst * 2.0**-_SINGLE)
     kinds: dict[str, tuple[Callable[..., Fraction], float]] = {
         "decimals": (lambda value, digits: Fraction(round(value * 10**digits), 10**digits), 0.5),
-        "significant": (
-            lambda value, digits: Fraction(decimal_text(value, digits)),
-            5 * 10.0 ** math.floor(math.log10(worst)),
-        ),
+        "significant": (lambda value, digits: Fraction(decimal_text(value, digits)), 5 * leading),
     }
     for kind, (rounded_to, scale) in kinds.items():
         for digits in range(1, precision.digits - _SPARE):

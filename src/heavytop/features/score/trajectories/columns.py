@@ -81,8 +81,7 @@ _LENGTHS = ("m", *_METRE)
 _OMEGA = ("omega", "omega_space", "framed")
 _UNITS = {"t": _SECOND, **dict.fromkeys(_OMEGA, _RATE), "position": _METRE, "rotation_vector": _ANGLE}
 """Units of a header in those of the data: s, rad/s and rad (as multiples of π), and m."""
-_SECONDS = ("s", "sec", "second", "seconds")
-_OF_DATA = ("", "1", "-", "--", *_SECONDS, "m", "rad", "1/s", *(f"rad{second}" for second in _A_SECOND))
+_OF_DATA = ("", "1", "-", "s", "sec", "second", "seconds", "m", "rad", "1/s", *(f"rad{each}" for each in _A_SECOND))
 
 
 @dataclass(frozen=True, slots=True)
