@@ -21,8 +21,8 @@ from heavytop.records import Row
 
 # Where tasks run: in this process, in local processes, or on a Dask cluster.  The rows are the same.
 #
-# At most four tasks per worker are submitted at a time, so that memory does not grow with the length of a plan.  A
-# worker is a process, whatever the number of its threads.
+# On a cluster at most four tasks per worker are submitted at a time, so that memory does not grow with the length of a
+# plan; here a worker has one.  A worker is a process, whatever the number of its threads.
 
 
 _AHEAD = 4
