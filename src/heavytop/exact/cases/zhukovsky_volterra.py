@@ -31,9 +31,10 @@ from fractions import Fraction
 from math import factorial
 from typing import Any, NamedTuple
 
-from flint import arb, arb_mat, fmpq_mat, fmpq_poly
+from flint import arb, arb_mat, fmpq, fmpq_mat, fmpq_poly
 
 from heavytop.errors import LevelNotDone
+from heavytop.exact.cases.lagrange import polynomial
 from heavytop.exact.closed_form import (
     ClosedForm,
     balls,
@@ -58,7 +59,7 @@ from heavytop.exact.elliptic.weierstrass import (
 )
 from heavytop.exact.flint.balls import BallLike, Balls, ball, current_length, rational, unit_of_time
 from heavytop.exact.solution import NO_TORQUE
-from heavytop.precision import Vector, cross, dot
+from heavytop.precision import Vector, cross, dot, exact
 from heavytop.top.bodies import IDENTITY
 from heavytop.top.equations import HEAVY_GYROSTAT
 
@@ -119,7 +120,7 @@ class ZhukovskyVolterra(ClosedForm):
         product = lines[0] * lines[1] * lines[2] * (last - fmpq_poly([0, rational(square)]))
         for row in range(3):
             product -= (rotor[row] * rates[row]) ** 2 * lines[row - 1] * lines[row - 2]
-        return [Fraction(int(c.p), int(c.q)) for c in product.coeffs()]
+        return list(map(exact, product.coeffs()))
 
     def invariants(self) -> tuple[Fraction, Fraction]:
         """(g2, g3)."""
@@ -188,11 +189,11 @@ def _combined(rows: arb_mat, terms: Sequence[Any]) -> list[BallLike]:
 
 @dataclass(frozen=True, slots=True)
 class _Exact:
-    """D and D Mi as combinations of 1, ℘, ℘', ℘², ℘℘', and the Laurent series of D from t^−5 on."""
+    """D and D Mi as combinations of 1, ℘, ℘', ℘², ℘℘', and the Laurent series of D, times t^5."""
 
     denominator: tuple[Fraction, ...]
     numerators: tuple[tuple[Fraction, ...], ...]
-    series: tuple[Fraction, ...]
+    series: fmpq_poly
 
 
 class _Curve(NamedTuple):
@@ -202,38 +203,19 @@ class _Curve(NamedTuple):
     order: int
 
 
-def _basis(g2: Fraction, g3: Fraction) -> list[list[Fraction]]:
-    """The Laurent series of 1, ℘, ℘', ℘², ℘℘' from t^−5 to t^5."""
-    zero = Fraction(0)
-    size = _POLE + _LAST + 1
-    wide = size + 4
-    wp = [zero] * wide  # from t^-5
-    wp[3], wp[7], wp[9] = Fraction(1), g2 / 20, g3 / 28
-    for n in range(4, (wide - 4) // 2 + 1):
-        parts = sum((wp[2 * j + 3] * wp[2 * (n - j) + 3] for j in range(2, n - 1)), zero)
-        if 2 * n + 3 < wide:
-            wp[2 * n + 3] = Fraction(3, (2 * n + 1) * (n - 3)) * parts
-    slope = [(n + 1 - _POLE) * wp[n + 1] if n + 1 < wide else zero for n in range(wide)]
-
-    def times(one: list[Fraction], other: list[Fraction]) -> list[Fraction]:
-        return [
-            sum((one[i] * other[n + _POLE - i] for i in range(wide) if 0 <= n + _POLE - i < wide), zero)
-            for n in range(size)
-        ]
-
-    one = [zero] * size
-    one[_POLE] = Fraction(1)
-    return [one, wp[:size], slope[:size], times(wp, wp), times(wp, slope)]
+def _basis(g2: Fraction, g3: Fraction) -> list[fmpq_poly]:
+    """The Laurent series of 1, ℘, ℘', ℘², ℘℘' up to t^5, times t^5 (DLMF 23.9)."""
+    c2, c3, t = rational(g2 / 20), rational(g3 / 28), fmpq_poly([0, 1])
+    wp = fmpq_poly([1, 0, 0, 0, c2, 0, c3, 0, c2 * c2 / 3, 0, 3 * c2 * c3 / 11])  # t²℘
+    slope = t * wp.derivative() - 2 * wp
+    return [row % t ** (_POLE + _LAST + 1) for row in (t**5, t**3 * wp, t**2 * slope, t * wp * wp, wp * slope)]
 
 
-def _momentum_series(case: ZhukovskyVolterra) -> list[list[Fraction]]:
-    """The Taylor coefficients of M at t = 0, up to t^10."""
+def _momentum_series(case: ZhukovskyVolterra) -> list[fmpq_poly]:
+    """The Taylor series of M at t = 0, up to t^10."""
     rows = taylor(HEAVY_GYROSTAT.field, _parameters(case), case.start.flat, _POLE + _LAST + 1)
-    columns = []
-    for moment, rotor, row in zip(case.top.inertia, case._rotor, rows[:3], strict=True):
-        series = [moment * c for c in row]
-        columns.append([series[0] + rotor, *series[1:]])
-    return columns
+    parts = zip(case.top.inertia, rows[:3], case._rotor, strict=True)
+    return [rational(moment) * polynomial(*row) + rational(rotor) for moment, row, rotor in parts]
 
 
 def _parameters(case: ZhukovskyVolterra) -> Any:
@@ -243,34 +225,22 @@ def _parameters(case: ZhukovskyVolterra) -> Any:
 @once
 def _exact(case: ZhukovskyVolterra) -> _Exact:
     """The exact data of the curve, by linear equations."""
-    basis, momentum = _basis(*case.invariants()), _momentum_series(case)
-    size = len(basis[0])
-    equations = []
-    for axis, series in enumerate(momentum):
-        moved = [_times_taylor(row, series) for row in basis]
-        for power in range(size):
-            line = [row[power] for row in moved] + [Fraction(0)] * 15
-            for j, row in enumerate(basis):
-                line[5 + 5 * axis + j] = -row[power]
+    basis, equations = _basis(*case.invariants()), []
+    for axis, momentum in enumerate(_momentum_series(case)):
+        products = [row * momentum for row in basis]
+        for power in range(_POLE + _LAST + 1):
+            line = [product[power] for product in products] + [fmpq(0)] * 15
+            line[5 + 5 * axis : 10 + 5 * axis] = [-row[power] for row in basis]
             equations.append(line)
     solution = _kernel(equations)
-    groups = [tuple(solution[start : start + 5]) for start in (0, 5, 10, 15)]
-    denominator_series = tuple(
-        sum((d * row[power] for d, row in zip(groups[0], basis, strict=True)), Fraction(0)) for power in range(size)
-    )
-    return _Exact(groups[0], tuple(groups[1:]), denominator_series)
+    denominator, *numerators = (tuple(solution[start : start + 5]) for start in (0, 5, 10, 15))
+    series = sum((rational(d) * row for d, row in zip(denominator, basis, strict=True)), fmpq_poly())
+    return _Exact(denominator, tuple(numerators), series)
 
 
-def _times_taylor(laurent: Sequence[Fraction], series: Sequence[Fraction]) -> list[Fraction]:
-    return [
-        sum((laurent[k - n] * series[n] for n in range(min(k + 1, len(series)))), Fraction(0))
-        for k in range(len(laurent))
-    ]
-
-
-def _kernel(equations: Sequence[Sequence[Fraction]]) -> list[Fraction]:
+def _kernel(equations: Sequence[Sequence[fmpq]]) -> list[Fraction]:
     """The one solution of homogeneous equations, up to a factor; raises LevelNotDone where there are more."""
-    matrix: Any = fmpq_mat([[rational(value) for value in line] for line in equations])
+    matrix: Any = fmpq_mat(equations)
     basis, count = matrix.numer_denom()[0].nullspace()
     if count != 1:
         raise LevelNotDone("The curve of M is degenerate.", "Use the enclosure for this motion.")
@@ -279,9 +249,9 @@ def _kernel(equations: Sequence[Sequence[Fraction]]) -> list[Fraction]:
 
 @cached_per_precision
 def _curve(case: ZhukovskyVolterra) -> _Curve:
-    exact = _exact(case)
-    order = _POLE if exact.denominator[4] else _POLE - 1
-    rows: Any = [[ball(c) for c in row[:order]] for row in (exact.denominator, *exact.numerators)]
+    curve = _exact(case)
+    order = _POLE if curve.denominator[4] else _POLE - 1
+    rows: Any = [[ball(c) for c in row[:order]] for row in (curve.denominator, *curve.numerators)]
     return _Curve(arb_mat(rows), order)
 
 
@@ -343,7 +313,7 @@ def _axes(case: ZhukovskyVolterra) -> list[_Fixed]:
 
 
 def _fixed(case: ZhukovskyVolterra, vector: Vector) -> _Fixed:
-    momentum, exact = case.momentum, _exact(case)
+    momentum = case.momentum
     square = dot(momentum, momentum)
     share = dot(vector, momentum) / square
     across: Any = tuple(v - share * m for v, m in zip(vector, momentum, strict=True))
@@ -355,9 +325,10 @@ def _fixed(case: ZhukovskyVolterra, vector: Vector) -> _Fixed:
     root = ball(winding.square).sqrt()
     factors: Any = []
     for real_part, imaginary in zip(_body_series(case, across), _body_series(case, normal), strict=True):
-        rows = [_times_taylor(exact.series, part) for part in (real_part, imaginary)]
+        products = [_exact(case).series * polynomial(*part) for part in (real_part, imaginary)]
         # Φ^(k) begins with (−1)^k k!/t^(k + 1)
-        parts = enumerate(reversed(unwound(rows[0], rows[1], winding)[:_POLE]))
+        first, second = ([exact(series[n]) for n in range(_POLE)] for series in products)
+        parts = enumerate(reversed(unwound(first, second, winding)))
         scaled = [(a * (-1) ** k / factorial(k), b * (-1) ** k / factorial(k)) for k, (a, b) in parts]
         factors.append([*(ball(a) for a, _ in scaled[:order]), *(ball(-b) * root for _, b in scaled[:order])])
     return _Fixed(ball(share), second_kind(_lattice(case), winding), arb_mat(factors), invariant, order)
