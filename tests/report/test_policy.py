@@ -30,6 +30,7 @@ def drift(value: str, band: float | None = None, **changes) -> Row:
         ("[[rule]]\nmetrik = 'x'", "unknown field `metrik`"),
         ("floor = -1", "floor must not be negative; got -1"),
         ("noise = 'much'", "is not a finite number"),
+        ("duration = 5", "duration must be at most 1; got 5"),
         ("loss_bits = 1\nloss_digits = 1", "loss_bits and loss_digits were given"),
         ("flags = 'sometimes'", "flags = 'sometimes': incomparable or ignore"),
         ("[timings]\ncompare = 'no'", "timings.compare = 'no': never, same-machine or always"),

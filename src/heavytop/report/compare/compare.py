@@ -134,7 +134,8 @@ def compare(
         for finding in chain.from_iterable(findings_by_row)
     ]
     if not rows.same and all(finding.verdict is Verdict.NEW for finding in findings):
-        raise InputError("There is nothing to compare.", "Compare reports of `heavytop run` that have rows.")
+        remedy = "Compare reports of `heavytop run` that have rows, by a policy that does not ignore all of them."
+        raise InputError("There is nothing to compare.", remedy)
     same = rows.same + sum(finding.verdict is Verdict.SAME for finding in findings)
     planned = "seed" in baseline.plan | candidate.plan  # a score has no plan
     joined = [motion for motion in motions if motion is not None]

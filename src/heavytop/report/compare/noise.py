@@ -62,6 +62,8 @@ class Allowance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         for name in ("floor", "loss_bits", "loss_digits", "noise", "duration", "value"):
             if (value := getattr(self, name)) is not None:
                 _not_negative(name, value)
+                if name == "duration" and physical(value, name) > 1:
+                    raise InputError(f"duration must be at most 1; got {value}.", "Give a fraction: 0.05 is 5 %.")
 
 
 class Rule(Allowance, frozen=True, forbid_unknown_fields=True, kw_only=True):
