@@ -123,7 +123,8 @@ def test_a_folder_that_holds_anything_and_an_unknown_language_are_refused(tmp_pa
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "file").touch()
     (tmp_path / "empty").mkdir()
-    for folder, *words in (("full", "c"), ("full/file", "c"), ("new", "cobol"), ("new", "c", "rk")):
+    wrong = ("new", "cobol"), ("new", "c", "rk"), ("new", "c", "step", None, "drake")
+    for folder, *words in (("full", "c"), ("full/file", "c"), *wrong):
         with pytest.raises(InputError) as caught:
             new_integrator(tmp_path / folder, *words)
         assert caught.value.remedy

@@ -104,6 +104,8 @@ def new_integrator(
             raise InputError(f"Unknown {noun} {quoted(name)}.", f"Use {', '.join(choices)}.")
     if engine and engine not in (known := engines()):
         raise InputError(f"engine must have an adapter; got {quoted(engine)}.", f"Use {', '.join(known)}.")
+    if engine and (language, method) != ("python", "step"):
+        raise InputError(f"An adapter is in Python, without a method; got {language}, {method}.", "Leave them out.")
     workflow = (into or folder) / _WORKFLOW
     with writable(folder, "Give a writable folder."):
         require_new(folder, "Give a new folder.")

@@ -80,7 +80,8 @@ def new(
     print(fill(f"{made}: {', '.join(files)}", 80, subsequent_indent="  ", **_WHOLE_WORDS))
     build = "" if language == "python" else f"{LANGUAGES[language].build}; "
     first = "cat README.md" if engine else f"{build}heavytop check-integrator mine.toml"
-    print(f"Next: cd {quote(str(made))}; {first}; heavytop gate --bless")
+    folder_name = f"./{made}" if str(made).startswith("-") else str(made)
+    print(f"Next: cd {quote(folder_name)}; {first}; heavytop gate --bless")
     return ExitCode.GOOD
 
 
