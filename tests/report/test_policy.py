@@ -100,6 +100,16 @@ def test_what_is_ignored_is_left_out_even_where_it_is_missing_or_worse(tmp_path:
             compare(report(*old), report(drift("2")), given if old else Policy())
 
 
+def test_a_rule_that_matches_nothing_is_said(tmp_path: Path) -> None:
+    rules = ("metric = 'drft_*'\nlimit = 1", "case = 'none'", "metric = 'drift_*'", "metric = 'seconds run'")
+    given = policy(tmp_path, "".join(f"[[rule]]\n{rule}\n" for rule in rules))
+    for new in (drift("1e-12"), drift("1")):
+        assert compare(report(drift("1e-12")), report(new), given).sentences[-2:] == [
+            'The rule of the policy with metric = "drft_*" matches nothing.',
+            'The rule of the policy with case = "none" matches nothing.',
+        ]
+
+
 def test_changed_flags_are_compared_only_where_the_policy_says_so(tmp_path: Path) -> None:
     other = drift("1e-12", flags={"tolerance": "1e-9"})
     assert verdicts(drift("1e-12"), other, Policy()) == {"": "incomparable"}

@@ -32,9 +32,9 @@ class Differences:
     """All findings, and the differences of the plans and environments.
 
     same: the number of unchanged metrics that are not listed among the findings.  sentences: at most eight about the
-    changes, the most telling first, and one for each survey with motions that got worse.  rows: the changed ones, the
-    worst first.  changed: the findings other than same, the worst first.  motions: of each survey whose records were
-    joined.
+    changes, the most telling first, one for each survey with motions that got worse, and one for each rule of the
+    policy that matches nothing.  rows: the changed ones, the worst first.  changed: the findings other than same, the
+    worst first.  motions: of each survey whose records were joined.
     """
 
     findings: list[Finding]
@@ -139,12 +139,17 @@ def compare(
     same = rows.same + sum(finding.verdict is Verdict.SAME for finding in findings)
     planned = "seed" in baseline.plan | candidate.plan  # a score has no plan
     joined = [motion for motion in motions if motion is not None]
+    unused = (f"The rule of the policy with {rule.text} matches nothing." for rule in rows.limits.unmatched)
     return Differences(
         findings,
         (_differences({"plan": baseline.plan}, {"plan": candidate.plan}) if planned else [])
         + _differences(baseline.environment, candidate.environment),
         rows.same,
-        [*sentences(changes, same, rows.failed), *(motion.sentence for motion in joined if motion.sentence)],
+        [
+            *sentences(changes, same, rows.failed),
+            *(motion.sentence for motion in joined if motion.sentence),
+            *unused,
+        ],
         changes.worst_first,
         joined,
     )

@@ -16,6 +16,7 @@ import tomllib
 from fnmatch import translate
 from fractions import Fraction
 from functools import lru_cache
+from itertools import chain
 from pathlib import Path
 from typing import Literal
 
@@ -26,6 +27,7 @@ from heavytop.files import read_whole, readable
 from heavytop.measure.scorer import SOLUTION_ERROR
 from heavytop.precision import exact, log10, physical
 from heavytop.records import Metric, Row
+from heavytop.report.document.document import clip
 from heavytop.report.document.kind import ReportedKind
 
 # Policies: when two numbers count as the same, by default or by a TOML file of rules.  docs/compare.md shows every key.
@@ -85,6 +87,12 @@ class Rule(Allowance, frozen=True, forbid_unknown_fields=True, kw_only=True):
         if self.limit is not None:
             _not_negative("limit", self.limit)
 
+    @property
+    def text(self) -> str:
+        """Its patterns, apart from those that match everything: ``case = "euler", metric = "drift_*"``."""
+        patterns = {"measure": self.measure, "case": self.case, "metric": self.metric}
+        return ", ".join(f'{key} = "{clip(pattern, 40)}"' for key, pattern in patterns.items() if pattern != "*")
+
 
 class Timings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Whether seconds are compared: never, between runs of one machine, or always.  They may grow by ``ratio``; below
@@ -135,11 +143,15 @@ class Limits(msgspec.Struct, frozen=True):
 
 
 class Lookup:
-    """The limits of each metric of a row under a policy, cached.  usual: those of metrics without a rule."""
+    """The limits of each metric of a row under a policy, cached.
+
+    usual: those of metrics without a rule.  unmatched: the rules that match no metric of the rows so far.
+    """
 
     def __init__(self, policy: Policy) -> None:
         self.usual = _limits(Rule(), policy)
-        self._rules = [(glob(r.measure), glob(r.case), glob(r.metric), _limits(r, policy)) for r in policy.rule]
+        self.unmatched = list(policy.rule)
+        self._rules = [(_patterns(rule), _limits(rule, policy)) for rule in policy.rule]
         self._known: dict[tuple[str, str, str], Limits] = {}
 
     def __call__(self, row: Row, metric: str) -> Limits:
@@ -148,9 +160,22 @@ class Lookup:
             return self.usual
         key = row.key.kind, row.case, metric
         if key not in self._known:
-            matching = (limits for *patterns, limits in self._rules if all(map(re.Pattern.fullmatch, patterns, key)))
+            matching = (limits for patterns, limits in self._rules if all(map(re.Pattern.fullmatch, patterns, key)))
             self._known[key] = next(matching, self.usual)
         return self._known[key]
+
+    def note(self, row: Row) -> None:
+        """Removes the rules that match something in the row from the unmatched ones."""
+        for rule in [*self.unmatched]:
+            measure, case, metric = _patterns(rule)
+            if measure.fullmatch(row.key.kind) and case.fullmatch(row.case):
+                parts = (f"series {name}" for name in row.series), (f"growth {name}" for name in row.laws)
+                if any(map(metric.fullmatch, chain(("", "seconds run"), row.metrics, *parts))):
+                    self.unmatched.remove(rule)
+
+
+def _patterns(rule: Rule) -> tuple[re.Pattern[str], re.Pattern[str], re.Pattern[str]]:
+    return glob(rule.measure), glob(rule.case), glob(rule.metric)
 
 
 def load(path: Path) -> Policy:
@@ -206,6 +231,7 @@ def _not_negative(name: str, value: str | float) -> None:
         raise InputError(f"{name} must not be negative; got {shown}.", "Give 0 or more.")
 
 
+@lru_cache
 def glob(pattern: str) -> re.Pattern[str]:
     """A pattern of `*`, `?` and `[...]`; raises InputError for an empty one, or one whose bracket is not closed."""
     if not pattern or pattern.count("[") > pattern.count("]"):

@@ -369,12 +369,14 @@ class RowComparison:
 
     def ignores(self, row: Row) -> bool:
         """Whether a rule ignores the whole row: one whose pattern matches every metric."""
+        self.limits.note(row)
         return self.limits(row, "").ignore
 
     def compare(self, old: Row, new: Row) -> list[Finding]:
         """All findings about a row that both reports have."""
         pair = RowPair(old, new, kind_of(old, self.kinds))
         ignored = self.ignores(old)
+        self.limits.note(new)
         if (judged := self._outcomes(old, new)) is not None:
             return [] if ignored else [*self._whole_row(pair, judged), *self._limits(pair)]
         if reason := self._incomparable(old, new):
