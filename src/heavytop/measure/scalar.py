@@ -213,8 +213,8 @@ def explains(rounding: Rounding, error: float) -> bool:
 
 
 def _roundings(numbers: Sequence[Fraction], precision: Precision) -> Iterator[Rounding]:
-    worst = float(min(Fraction(1), max(map(abs, numbers))))
-    leading = 10.0 ** math.floor(math.log10(worst))  # place of the first digit
+    largest = min(Fraction(1), max(map(abs, numbers)))
+    worst, leading = float(largest), 10.0 ** math.floor(log10(largest) or 0)  # place of the first digit
     written: list[Callable[[Fraction], Fraction]] = [lambda value: value]
     single = Rounding("single", _SINGLE, worst * 2.0**-_SINGLE)
     kinds: dict[str, tuple[Callable[..., Fraction], float]] = {

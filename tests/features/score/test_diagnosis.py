@@ -14,7 +14,7 @@ from heavytop.features.score.diagnose.search import Diagnosis
 from heavytop.features.score.text import diagnosis_text, sentence
 from heavytop.integrate.heyoka.engines import compiled
 from heavytop.measure.scalar import roundings
-from heavytop.precision import DOUBLE, QUAD, cross
+from heavytop.precision import DOUBLE, real, QUAD, cross
 from heavytop.top.attitude import rotation_of
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, Parameters, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State
@@ -357,6 +357,10 @@ def test_rounded_states_are_told_where_rounding_is_the_error(digits: int, kind: 
         assert told.kind == "gamma_down"
     rows = [tuple(Fraction(v) for v in row) for row in y]
     assert roundings(rows, DOUBLE) == []
+
+
+def test_numbers_below_those_of_double_have_no_common_rounding() -> None:
+    assert roundings([[Fraction(n, 3 * 10**400) for n in range(1, 20)]], real(237)) == []
 
 
 IN_UNITS = {
