@@ -14,7 +14,7 @@ from heavytop.features.score.diagnose.search import Diagnosis
 from heavytop.features.score.text import diagnosis_text, sentence
 from heavytop.integrate.heyoka.engines import compiled
 from heavytop.measure.scalar import roundings
-from heavytop.precision import DOUBLE, real, QUAD, cross
+from heavytop.precision import DOUBLE, QUAD, cross, real
 from heavytop.top.attitude import rotation_of
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, Parameters, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State
