@@ -7,6 +7,7 @@ import re
 import tomllib
 from bisect import bisect_right
 from collections.abc import Collection, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import replace
 from fractions import Fraction
 from functools import reduce
@@ -249,6 +250,7 @@ def with_integrator(plan: Plan, integrator: str | IntegratorSource) -> Plan:
 
 def of_document(document: dict[str, Any], kinds: Kinds) -> Plan:
     """The plan in a TOML document; raises ValidationError with the place of an unknown key, kind or impossible type."""
+    document = deepcopy(document)
     records.take_former(document)
     tables = {kind.name: kind.table for kind in kinds.values() if kind.table is not None}
     _require_kinds(document, "measure", tables)
