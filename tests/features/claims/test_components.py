@@ -159,7 +159,7 @@ def test_an_integrand_is_real_where_the_component_moves(quantity: str, integrand
 EULER_FROM_TWO_AXES = {
     "name": "euler",
     "kind": "component",
-    "parameters": {"I1": "3", "I2": "2", "I3": "1", "w1": "1", "w3": "2"},
+    "parameters": {"I1": "3", "I2": "2", "I3": "1", "w1": "1", "w3": "2", "g": "1"},
     "top": {"inertia": ["I1", "I2", "I3"], "weight": "0", "centre": ["0", "0", "0"]},
     "start": {"omega": ["w1", "0", "w3"], "gamma": ["0", "0", "1"]},
 }
@@ -171,19 +171,23 @@ FACTORED = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("quantity", "order", "verdict"),
+    ("quantity", "factor", "assume", "verdict"),
     [
-        ("Omega2", "I1 > I3", "holds"),
-        ("Omega2", "I1 != I3", "undecided"),  # both radicands are negative for I1 < I3
-        ("Omega1", "I2 > I3", "holds"),  # Omega1 turns at the start
-        ("Omega1", "I2 != I3", "undecided"),
+        ("Omega2", "", ["I1 > I3"], "holds"),
+        ("Omega2", "", ["I1 != I3"], "undecided"),  # both radicands are negative for I1 < I3
+        ("Omega1", "", ["I1 > I3", "I2 > I3"], "holds"),  # Omega1 turns at the start
+        ("Omega1", "", ["I1 > I3", "I2 != I3"], "undecided"),
+        ("Omega2", "g*u/(g*u)*", ["I1 > I3", "g != 0"], "holds"),
+        ("Omega2", "g*u/(g*u)*", ["I1 > I3"], "undecided"),  # 0/0 for all u where g = 0
     ],
 )
-def test_each_radicand_of_an_integrand_is_positive_for_all_parameters(quantity: str, order: str, verdict: str) -> None:
+def test_an_integrand_is_real_and_defined_for_all_parameters(
+    quantity: str, factor: str, assume: list[str], verdict: str
+) -> None:
     table = EULER_FROM_TWO_AXES | {
-        "assume": ["w1 > 0", "w3 > 0", order, "I1 > I3" if quantity == "Omega1" else "I2 > 0"],
+        "assume": ["w1 > 0", "w3 > 0", *assume],
         "component": {"quantity": quantity, "constants": ["I1^2*Omega1^2 + I2^2*Omega2^2 + I3^2*Omega3^2"]},
-        "quadrature": {"variable": "u", "integrand": FACTORED[quantity]},
+        "quadrature": {"variable": "u", "integrand": factor + FACTORED[quantity]},
     }
     assert audited(table).verdict == verdict
 

@@ -18,7 +18,14 @@ import sympy
 from msgspec import structs
 
 from heavytop.errors import InputError
-from heavytop.features.claims.algebra.conditions import ConditionKind, Need, condition, is_exactly_zero, written
+from heavytop.features.claims.algebra.conditions import (
+    ConditionKind,
+    Need,
+    condition,
+    for_no_parameters,
+    is_exactly_zero,
+    written,
+)
 from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.prover import shortest
 from heavytop.features.claims.algebra.rational import forces_zero
@@ -164,31 +171,36 @@ class UserComponent(UserIntegral):
         )
         # the equation without roots is equivalent where the integrand is real
         f = 1 / slope**2
-        kept = (self._kept_real(need, f) for need in quadrature.needs)
-        return replace(quadrature, expression=f, needs=frozenset(need for need in kept if need is not None))
+        needs = frozenset(kept for need in quadrature.needs for kept in self._kept_real(need, f))
+        return replace(quadrature, expression=f, needs=needs)
 
-    def _kept_real(self, need: Need, f: sympy.Expr) -> Need | None:
-        """What remains to be proven of a condition on u for it to hold wherever u moves; None where nothing does.
+    def _kept_real(self, need: Need, f: sympy.Expr) -> Iterator[Need]:
+        """What remains to be proven of a condition on u for it to hold wherever u moves, but for single values of u.
 
         There f(u) = u'^2 > 0, and R = f/c^2 has its sign.  A polynomial R with f = R g keeps its sign at the start: u
-        turns or rests at a zero of R.  Where R is 0 at the start, it takes the sign of g.
+        turns or rests at a zero of R.  Where R is 0 at the start, it takes the sign of g.  A divisor must not be 0 for
+        all u.
         """
         u, radicand = self._u, need.expression
         if u not in radicand.free_symbols:
-            return need
+            yield need
+            return
         if need.kind is ConditionKind.NONZERO:
-            return None  # f is finite and not 0 where u moves
+            for base in (factor.as_base_exp()[0] for factor in sympy.Mul.make_args(radicand)):
+                common = sympy.gcd(base, sympy.denom(sympy.cancel(f / base)))
+                if common.free_symbols and not for_no_parameters(base, self.setting.assumptions(0), ()):
+                    yield Need(ConditionKind.NONZERO, base)
+            return
         cofactor = sympy.cancel(f / radicand)
-        if not cofactor.is_rational_function(u):
-            return need
-        if _is_square(cofactor):
-            return None
-        common = sympy.gcd(radicand, sympy.denom(cofactor)) if self.start and radicand.is_polynomial(u) else u
-        if u in common.free_symbols:
-            return need
+        if cofactor.is_rational_function(u) and _is_square(cofactor):
+            return
+        is_polynomial = self.start and radicand.is_polynomial(u) and cofactor.is_rational_function(u)
+        if not is_polynomial or u in sympy.gcd(radicand, sympy.denom(cofactor)).free_symbols:
+            yield need
+            return
         begin = {u: self._at_start(self.quantity.expression)}
         at_start = sympy.factor(radicand.xreplace(begin))
-        return Need(ConditionKind.POSITIVE, at_start if at_start != 0 else sympy.factor(cofactor.xreplace(begin)))
+        yield Need(ConditionKind.POSITIVE, at_start if at_start != 0 else sympy.factor(cofactor.xreplace(begin)))
 
     def _of(self, name: str, table: QuadratureTable | ComponentTable | None) -> Formula | None:
         """A formula of a table, which may contain t in [component]; None where absent."""
