@@ -44,10 +44,14 @@ def run_of(name: str, times, precision=DOUBLE, case=CASE, **options) -> Trajecto
 
 
 def assert_as_one_by_one(name: str, given, precision=DOUBLE, case=CASE, many=None, **options) -> Trajectory:
-    """The run has the bits of one whose states are observed, which takes one sample after the other."""
+    """The run has the bits of one with resume points, which takes one sample after the other, observed or not."""
+    one_by_one = run_of(name, given, precision, case, mark=lambda _: None, **options)
     seen: list = []
     run = run_of(name, given, precision, case, observer=lambda *sample: seen.append(sample), **options)
+    assert not len(run.states)
     times, states = [time for time, _ in seen], [state for _, state in seen]
+    assert tuple(one_by_one.times) == tuple(times)
+    assert all((a == b).all() for a, b in zip(one_by_one.states, states, strict=True))
     many = many or run_of(name, given, precision, case, **options)
     assert tuple(many.times) == tuple(times)
     assert (many.outcome, many.steps, many.time_reached, many.order) == (

@@ -266,12 +266,18 @@ def integrate_to_samples(
             flags={**run.flags, "unit": f"2^{unit.numerator.bit_length() - unit.denominator.bit_length()}"},
         )
     began = perf_counter()
-    if stepping is Stepper and all(option is None for option in (observer, between, place, mark)):
+    if stepping is Stepper and all(option is None for option in (between, place, mark)):
         at_once = _at_once(engine, lambda: load(engine, problem), targets, step_limit, problem.precision)
         if at_once is not None:
-            stepper = Stepper(engine, bool(targets[-1] >= 0), None, None, steps=at_once[0])
+            steps, states = at_once
+            stepper = Stepper(engine, bool(targets[-1] >= 0), None, None, steps=steps)
+            rounded_times = RoundedTimes(targets)
+            if observer is not None:
+                for time, state in zip(rounded_times, states, strict=True):
+                    observer(time, state)
+                states = states[:0]
             seconds = perf_counter() - began
-            return _trajectory(tool, problem, stepper, RoundedTimes(targets), at_once[1], Outcome.SUCCESS, seconds)
+            return _trajectory(tool, problem, stepper, rounded_times, states, Outcome.SUCCESS, seconds)
     load(engine, problem)
     if problem.precision.family == "double":
         targets = list(map(float, targets))  # as far() is
