@@ -69,6 +69,7 @@ def assert_as_one_by_one(name: str, given, precision=DOUBLE, case=CASE, many=Non
         ("heyoka", DOUBLE, 1),
         ("heyoka", EXTENDED, 1),
         ("heyoka", QUAD, 20),
+        ("heyoka", parse("real:150"), 20),
         ("multiword", DOUBLE, 1),
         ("multiword", EXTENDED, 5),
         ("multiword", parse("double-double"), 5),

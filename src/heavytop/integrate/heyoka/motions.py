@@ -345,11 +345,12 @@ def _at_once(
     """Steps and states at many targets, with the bits of :class:`Stepper`, in one call of heyoka.
 
     begin: sets the engine to the beginning; called first to measure the first step, and again for the run.
-    heyoka cuts the last step alone, whose polynomial does not depend on its length.  None for few targets and for long
-    runs, and where the call does not reach the last target; the state of the engine is then undefined.
+    heyoka cuts the last step alone, whose polynomial does not depend on its length.  None for few targets, in
+    arbitrary precision, for long runs, and where the call does not reach the last target; the state of the engine is
+    then undefined.
     """
     most = _ON_A_GRID.get(precision.family, 0)
-    if len(targets) < _MANY:
+    if len(targets) < _MANY or not most:
         return None
     begin()
     end = far(bool(targets[-1] >= 0), precision)
