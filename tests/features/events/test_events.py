@@ -405,6 +405,10 @@ def test_a_section_of_several_starts() -> None:
     assert area == float(sum(m * g for m, g in zip(momentum, START.gamma, strict=True)))
     with pytest.raises(InputError, match="No starts were given"):
         ht.poincare(TOP, [], 40)
+    with pytest.raises(InputError, match="does not support precision or integrator"):
+        ht.poincare(TOP, START, 10, precision=ht.QUAD, digits=15)
+    with pytest.raises(InputError, match="does not support precision or integrator"):
+        ht.poincare(TOP, START, 10, integrator="scipy:Radau", digits=15)
     with pytest.raises(InputError, match=r"Start 1: .*zero along"):
         ht.poincare(PENDULUM, [ht.State((0, 1, 0), (1, 0, 0)), ht.State((0, 0, 1), (1, 0, 0))], 5, "omega2")
     with pytest.raises(InputError, match="not a component"):

@@ -217,6 +217,10 @@ def poincare(
         InputError, OutOfReach: as :func:`events`, naming the start.
     """
     listed = arguments.listed(starts, State, "starts")
+    if digits is not None and (precision, integrator) != (DOUBLE, "heyoka"):
+        raise InputError(
+            "A proven section (digits) does not support precision or integrator.", "Leave these out, or digits."
+        )
     if not listed:
         raise InputError("No starts were given.", "Give at least one State.")
     sections: list[Events | ReferenceEvents] = []
