@@ -153,6 +153,8 @@ def test_rows_as_parquet_come_with_the_run_or_from_its_report(finished: Path, tm
     assert (tmp_path / "one.parquet").read_bytes() == (finished / "two" / "rows.parquet").read_bytes()
     assert not (finished / "one" / "rows.parquet").exists()
     assert "ends in .parquet" in refused("show", finished / "one", "--parquet", "report.json", cwd=tmp_path)
+    document = printed("show", finished / "one", "--parquet", "again.parquet", "--json", cwd=tmp_path)
+    assert json.loads(document) == json.loads(printed("show", finished / "one", "--json", cwd=tmp_path))
     twice = ("--parquet", "x.parquet", "--html", "./x.parquet")
     assert "is named twice" in refused("show", finished / "one", *twice, cwd=tmp_path)
     assert not (tmp_path / "x.parquet").exists()

@@ -163,6 +163,8 @@ def _prepared(
     options = _options(form, dict(zip(_OPTIONS, values, strict=True)), setup.watched(observer))
     with_attitude = arguments.flag(attitude, "attitude")
     which = named(integrator)
+    if xi is not None and with_attitude is False:
+        raise InputError("xi was given with attitude=False.", "Leave one of them out.")
     if with_attitude is None:
         with_attitude = state.attitude is not None and described(which).carries_attitude
     apart = xi is None and with_attitude

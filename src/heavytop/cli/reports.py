@@ -134,8 +134,9 @@ def show(
         tables.check_name(parquet)
     files = [path for path in (parquet, html, markdown) if path is not None]
     require_apart(files, report)
-    if not files:
+    if full or json or not files:
         _print(report, full, json)
+    if not files:
         return ExitCode.GOOD
     loaded = read_report(report)
     with ExitStack() as stack:
@@ -147,7 +148,7 @@ def show(
             stack.enter_context(atomic_write(markdown)).write(loaded.to_markdown().encode())
         if parquet is not None:
             tables.write(parquet, loaded.rows, loaded.plan)
-    for path in files:
+    for path in files if not (full or json) else ():
         print(path)
     return ExitCode.GOOD
 

@@ -286,6 +286,29 @@ def test_python_takes_arrays_of_any_kind() -> None:
             ht.score(motion.times, **given, **wrong)
 
 
+@pytest.mark.parametrize(
+    "unused",
+    [
+        {"angles": "degrees"},
+        {"sequence": "ZXZ"},
+        {"quaternion_order": "xyzw"},
+        {"quaternion": "space_to_body"},
+        {"matrix": "space_to_body"},
+        {"pivot": (1, 2, 3)},
+        {"point": (1, 2, 3)},
+        {"up": "y"},
+    ],
+    ids=lambda unused: next(iter(unused)),
+)
+def test_a_convention_of_an_array_that_is_not_given_is_refused(unused: dict) -> None:
+    top, start = ht.HeavyTop((3, 2, 1), 1, ("1/2", 0, 0)), ht.State((1, 0, 2), ("3/5", 0, "4/5"))
+    states = [[*start.omega, *start.gamma]]
+    columns = {"omega": [state[:3] for state in states], "gamma": [state[3:] for state in states]}
+    for given in ({"states": states}, columns):
+        with pytest.raises(InputError, match=f"{next(iter(unused))} was given"):
+            ht.score([1], top=top, start=start, **given, **unused)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("power", [-60, 40])
 def test_units_of_any_size_change_no_diagnosis(power: int, tmp_path: Path) -> None:

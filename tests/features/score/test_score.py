@@ -167,6 +167,7 @@ def test_what_is_not_finite_is_a_verdict(word: str, tmp_path: Path) -> None:
         ({"tolerence": "1e-9"}, "Unknown key 'tolerence'"),
         ({"Weight": "1"}, "Unknown key 'Weight'"),
         ({"mass": "1"}, "weight and mass were given"),
+        ({"about": "centre"}, "about = centre was given without mass and gravity"),
     ],
 )
 def test_a_file_that_cannot_be_scored_is_refused_in_words(change: dict, message: str, tmp_path: Path) -> None:

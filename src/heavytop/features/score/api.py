@@ -259,16 +259,39 @@ def score(
         given,
     )
     state = arguments.is_a(start, State, "start")
+    where = None if point is None else vector(point, "point")
+    said = Convention(**words, pivot=vector(pivot, "pivot"), point=where)
+    _require_used(said, arrays, bool(state.attitude))
     if given is not None and set(arrays) == {"omega", "gamma"} and isinstance(body, HeavyTop) and not state.attitude:
         _, state = arguments.motion(body, state)
         return scored(of_arrays(body, state, about, instants, given, form, *names), needed)
-    where = None if point is None else vector(point, "point")
-    said = Convention(**words, pivot=vector(pivot, "pivot"), point=where)
     if "euler" in arrays and not said.sequence:
         raise InputError("Euler angles need a sequence.", 'Give sequence, such as "ZXZ" or "ZYX".')
     require_system(about)
     trajectory = of_observed_arrays(body, raw_start(state), said, instants, arrays, form, names, flag)
     return scored(trajectory, needed)
+
+
+_USED_BY = {
+    "quaternion_order": ("quaternions", "quaternion"),
+    "quaternion": ("quaternions", "quaternion"),
+    "matrix": ("matrices", "matrix"),
+    "sequence": ("euler", "euler"),
+    "angles": ("euler", "euler"),
+    "pivot": ("positions", "position"),
+    "point": ("positions", "position"),
+}
+"""The argument that each convention is about, and its name among the columns."""
+
+
+def _require_used(convention: Convention, arrays: Mapping[str, Any], attitude: bool) -> None:
+    """Raises InputError for a convention, other than by default, of an array that was not given."""
+    usual = Convention()
+    for word, (needed, name) in _USED_BY.items():
+        if name not in arrays and getattr(convention, word) != getattr(usual, word):
+            raise InputError(f"{word} was given without {needed}.", f"Give {needed}, or leave {word} out.")
+    if convention.up != usual.up and {"gamma"} <= set(arrays) <= {"omega", "gamma"} and not attitude:
+        raise InputError("up was given for states in body axes.", "Leave up out: γ points up, in body axes.")
 
 
 def read_trajectory(

@@ -535,6 +535,9 @@ def _body(document: dict[str, Any], case: Case | None) -> AnyBody:
         return body_of({key: document[key] for key in ("file", "link", *BODY) if key in document})
     keys = [key for key in ("mass", "gravity") if key in document]
     if not keys:
+        if document.get("about") in ("centre", CENTRE):
+            remedy = "Give both: moments beside a weight are about the fixed point."
+            raise InputError(f"about = {document['about']} was given without mass and gravity.", remedy)
         return _top(document, case)
     if "weight" in document:
         raise InputError(f"weight and {keys[0]} were given.", "Give the weight, or mass and gravity.")
