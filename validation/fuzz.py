@@ -418,7 +418,7 @@ def tried(call: Callable[[], object]) -> str:
 
 def main(count: int = 10_000, seed: int = 1, first: int = 0) -> int:
     guard.in_time.__defaults__ = (SECONDS / 2,)
-    registry.MOST_STEPS = 10**5
+    registry.MOST_STEPS, registry._FAR_BELOW = 10**5, 1e4
     found: Counter[str] = Counter()
     kinds: Counter[str] = Counter()
     began, longest = perf_counter(), 0.0

@@ -193,7 +193,7 @@ def path(value: str | os.PathLike[str], what: str) -> Path:
     try:
         checked = Path(value)
         checked.exists()
-        if "\0" in str(checked):
+        if b"\0" in os.fsencode(checked):
             raise ValueError
     except (OSError, TypeError, ValueError):  # no path, or one that no file can have
         raise refusal(what, "a path", quoted(value), "Give text or a pathlib.Path.") from None

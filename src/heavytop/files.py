@@ -84,7 +84,7 @@ def writable(path: Path, remedy: str = _RESUMABLE) -> Iterator[None]:
 @contextmanager
 def readable(path: Path | str, remedy: str, *errors: type[Exception]) -> Iterator[None]:
     """Report a failure to read ``path`` in this block as InputError; errors: further ones than those of the system."""
-    caught: tuple[type[Exception], ...] = (OSError, UnicodeDecodeError, *errors)
+    caught: tuple[type[Exception], ...] = (OSError, UnicodeError, *errors)
     try:
         yield
     except caught as error:

@@ -376,7 +376,8 @@ def named(integrator: Any, folder: Path | None = None) -> str | IntegratorSource
         return FORMER.get(integrator, integrator)  # the working directory may be gone
     base = (folder or Path()).absolute()
     if python is not None:
-        return PythonFile(str((base / python[1]).resolve()), python[2])
+        with readable(integrator, _YOURS):
+            return PythonFile(str((base / python[1]).resolve()), python[2])
     assert toml is not None
     match, path, wanted = toml, base / toml[1], toml[2]
     commands = [command for command in commands_in(path) if wanted in (None, command.name)]
