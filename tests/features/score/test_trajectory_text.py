@@ -122,6 +122,9 @@ DEGREES, RPM = np.repeat([180 / np.pi, 1], 3), np.repeat([30 / np.pi, 1], 3)
         ("time (µs);omega[1] (deg/sec);omega[2] (deg/sec);omega[3] (deg/sec);g1 [-];g2 [-];g3 [-]", DEGREES, 1_000_000),
         ("t / min,wx/(deg s^-1),wy/(deg s⁻¹),wz/deg·s^-1,g1,g2,g3", DEGREES, 1 / 60),
         ("t [s],w1 [rpm],w2 [rev/min],w3 [RPM],g1,g2,g3", RPM, 1),
+        ("t [s],w1 [rev/s],w2 [Hz],w3 [rps],g1,g2,g3", np.repeat([1 / (2 * np.pi), 1], 3), 1),
+        ("t [s],w1 [°/h],w2 [deg/hr],w3 [deg/hour],g1,g2,g3", np.repeat([648000 / np.pi, 1], 3), 1),
+        ("t [s],w1 [mrad/s],w2 [mrad s^-1],w3 [mrad/sec],g1,g2,g3", np.repeat([1000, 1], 3), 1),
         ("t [msec],w1 (dps),w2 (dps),w3 (dps),g1,g2,g3", DEGREES, 1000),
         ("t,w1,w2,w3,g1,g2,g3", np.ones(6), 1),
         ("t [s],w1 [rad/s],w2 [1/s],w3,g1 [1],g2,g3", np.ones(6), 1),
@@ -307,7 +310,7 @@ def test_what_is_of_another_quantity_is_left_out() -> None:
     ("header", "said"),
     [
         ("t [d];omega1;omega2;omega3;gamma1;gamma2;gamma3", "t in d"),
-        ("t [s];omega1/(rev/s);omega2/(rev/s);omega3/(rev/s);gamma1;gamma2;gamma3", "omega in rev/s"),
+        ("t [s];omega1/(gon/s);omega2/(gon/s);omega3/(gon/s);gamma1;gamma2;gamma3", "omega in gon/s"),
         ("t [s];omega1 [rad/s];omega2 [1/s];omega[3];gamma1;gamma2;gamma3", ""),
     ],
 )

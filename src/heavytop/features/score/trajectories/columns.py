@@ -70,17 +70,23 @@ _SECOND = {
     **dict.fromkeys(("min", "minutes"), Fraction(60)),
     **dict.fromkeys(("h", "hr", "hours"), Fraction(3600)),
 }
-_RATE = {
-    **{f"{unit}{second}": Fraction(1, 180) for unit in ("deg", "degree", "degrees", "°") for second in _A_SECOND},
-    "dps": Fraction(1, 180),
-    **dict.fromkeys(("rpm", "rev/min", "r/min"), Fraction(1, 30)),
-}
 _ANGLE = dict.fromkeys(("deg", "degree", "degrees", "°"), Fraction(1, 180))
+_TURN = dict.fromkeys(("rev", "r", "turn", "turns"), Fraction(2))
+_PER = {
+    **dict.fromkeys(_A_SECOND, Fraction(1)),
+    **dict.fromkeys(("/min", "/minute"), Fraction(1, 60)),
+    **dict.fromkeys(("/h", "/hr", "/hour"), Fraction(1, 3600)),
+}
+_RATE = {
+    **{f"{unit}{time}": size * rate for unit, size in (_ANGLE | _TURN).items() for time, rate in _PER.items()},
+    **{"dps": Fraction(1, 180), "rpm": Fraction(1, 30), "rps": Fraction(2), "hz": Fraction(2)},
+    **{f"mrad{second}": Fraction(1, 1000) for second in _A_SECOND},
+}
 _METRE = {"mm": Fraction(1, 10**3), "cm": Fraction(1, 100)}
 _LENGTHS = ("m", *_METRE)
 _OMEGA = ("omega", "omega_space", "framed")
 _UNITS = {"t": _SECOND, **dict.fromkeys(_OMEGA, _RATE), "position": _METRE, "rotation_vector": _ANGLE}
-"""Units of a header in those of the data: s, rad/s and rad (as multiples of π), and m."""
+"""Units of a header in those of the data: s, rad/s and rad (as multiples of π; mrad/s aside), and m."""
 _OF_DATA = ("", "1", "-", "s", "sec", "second", "seconds", "m", "rad", "1/s", *(f"rad{each}" for each in _A_SECOND))
 
 
@@ -219,7 +225,9 @@ def _unit(quantity: str, name: str) -> Unit:
     text = unicodedata.normalize("NFKC", (match[1] or match[2] or "") if match else "").lower()
     text = re.sub(r"[\s*·^().]", "", text.replace("−", "-"))
     known = _UNITS.get(quantity, {})
-    return Unit(text, known.get(text, Fraction(1)), text in known and known in (_RATE, _ANGLE))
+    return Unit(
+        text, known.get(text, Fraction(1)), text in known and known in (_RATE, _ANGLE) and not text.startswith("mrad")
+    )
 
 
 def _in_one_unit(units: Mapping[str, set[Unit]]) -> dict[str, Unit]:
