@@ -355,6 +355,9 @@ def test_stamps_in_double_say_how_many_digits_of_the_time_they_keep(tmp_path: Pa
         ("t,qw,qx,qy,qz,qdot_w,qdot_x,qdot_y,qdot_z,Tx,Ty,Tz,sigma_x,sigma_y,sigma_z", "quaternion"),
         ("t,wx_body,wy_body,wz_body,omega_x_world,omega_y_world,omega_z_world", "omega omega_space"),
         ("t,wx,wy,wz,rx [deg],ry [deg],rz [deg]", "framed"),
+        ("Time,Body.Angular Velocity.X,Body.Angular Velocity.Y,Body.Angular Velocity.Z", "framed"),
+        ("t,Sat.AngularVelocityX,Sat.AngularVelocityY,Sat.AngularVelocityZ", "framed"),
+        ("time,body.w_a[1],body.w_a[2],body.w_a[3]", "omega"),
     ],
 )  # fmt: skip
 def test_names_of_other_programs_are_understood(names: str, quantities: str) -> None:
@@ -388,6 +391,7 @@ def test_rows_of_one_time_are_one_where_they_agree_to_the_digits_printed(tmp_pat
         ("t,a_w,a_x,a_y,a_z,b_w,b_x,b_y,b_z", "Several columns are quaternions"),
         ("t,qpos[3],qpos[4],qpos[5],qpos[6]", "is not declared"),
         ("t,rx,ry,rz,n", "# attitude: rotation vector"),
+        ("t,angular rate 1,angular rate 2,angular rate 3,n", "looks like an angular velocity"),
         ("t,gx,gy,gz,n", "Ω of a gyroscope, or γ"),
         ("t,cmd_orientation_w,cmd_orientation_x,cmd_orientation_y,cmd_orientation_z", "not found"),
     ],

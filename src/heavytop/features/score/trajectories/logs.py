@@ -41,7 +41,7 @@ _ALIASES = tuple(
         (r"(?:quat(?:ernion)?|orientation|rotation|attitude)(?:_w)?[./_]([wxyz])", "q{}"),
         (r"(?:position|translation|pos)(?:_w)?[./_]([xyz])|(?-i:t([xyz])|T([XYZ]))", "p{}"),  # Tx is a torque
         (r"ang_?vel_w_([xyz])", "omega_space_{}"),  # of Isaac: _w_ is the world
-        (rf"(?:angular_?velocity|angular|angvel|ang_vel){_OF_BODY}[./_]([xyz])", "w{}"),
+        (rf"(?:angular(?:[_ ]?velocity)?|ang_?vel){_OF_BODY}[./_ ]?([xyz])", "w{}"),
         (rf"gyr(?:o(?:scope)?)?{_OF_BODY}[./_ ]?([xyz])", "w{}"),
         # of v_w_x the w is the world
         (rf"(?:(?:(?<!_)|(?<=imu_))w{_OF_BODY}[./_]?([xyz])|w([xyz]))", "w{}"),
@@ -55,7 +55,7 @@ _ALIASES = tuple(
         (r"sigma_BN[\[_(]?([0-3])[\])]?", "sigma{}"),
         (r"omega_BN_B[\[_(]?([0-3])[\])]?", "omega{}"),
         (r"(?<!_)quat(?:ernion)?[\[(]([0-4])[\])]", "quat{}"),
-        (r"(?<!_)(?:omega|ang_?vel|angular_?velocity)[\[(]([0-3])[\])]", "omega{}"),
+        (r"(?<!_)(?:omega|ang_?vel|angular_?velocity|w_a)[\[(]([0-3])[\])]", "omega{}"),  # w_a of Modelica
     )
 )
 _JOINTS = {"free": (3, 3), "ball": (0, 0)}
@@ -64,7 +64,7 @@ _INDEX = re.compile(r"(qpos|qvel)[\[_(]?(\d+)[\])]?", re.IGNORECASE)
 _DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
 _LOOKS = {
     "an attitude": re.compile(r"quat|orient|attitude|(^|[^a-z])att[^a-z]|rodrigues|euler|dcm", re.IGNORECASE),
-    "an angular velocity": re.compile(r"omega|ang(ular)?_?vel|gyro|body_?rate", re.IGNORECASE),
+    "an angular velocity": re.compile(r"omega|ang(ular)?[ _.-]?(vel|rate)|gyro|body[ _.-]?rate", re.IGNORECASE),
 }
 _GIVES = {
     "an attitude": ("quaternion", "matrix", "euler", "rodrigues", "rotation_vector", "gamma"),
