@@ -322,3 +322,15 @@ def test_a_gate_of_no_plan_leaves_the_report_of_before(tmp_path: Path) -> None:
     before.write_text("Move the baseline\n")
     refused("gate", "--plan", "gaet.toml", "--bless", cwd=tmp_path)
     assert before.read_text() == "Move the baseline\n"
+
+
+@pytest.mark.slow
+def test_a_gate_in_which_an_integrator_has_no_number_is_not_passed(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text('[[integrator]]\nname = "mine"\ncommand = ["./not-built"]\n')
+    runs = '[{ precision = "double", horizon = "1", samples = 3 }]'
+    measure = f'[[measure]]\nkind = "drift"\ncases = ["euler"]\nintegrator = "mine.toml"\nruns = {runs}\n'
+    (tmp_path / "gate.toml").write_text(f'name = "gate"\n{measure}')
+    assert run("gate", "--bless", cwd=tmp_path).returncode == 3
+    done = run("gate", "--json", cwd=tmp_path)
+    assert (done.returncode, json.loads(done.stdout)["verdict"]) == (3, "incomparable")
+    assert "no row of mine has a number" in done.stderr

@@ -27,7 +27,7 @@ from heavytop.harness.rows import Task
 from heavytop.harness.run import Progress, unheard
 from heavytop.harness.run import run as run_tasks
 from heavytop.integrate.peers.command import Command, greeting
-from heavytop.integrate.registry import name_of, named, seconds_of
+from heavytop.integrate.registry import is_third_party, name_of, named, seconds_of
 from heavytop.records import SCHEMA, Report, Row
 from heavytop.report.document.document import row_name
 from heavytop.report.render import page, text
@@ -44,10 +44,26 @@ MOST_ON_A_PAGE = 5000
 
 @dataclass(frozen=True, slots=True)
 class FinishedRun:
-    """A finished run: its summary, and whether no row failed."""
+    """A finished run: its summary, whether no row failed, and the third-party integrators without a number."""
 
     summary: str
     good: bool
+    unmeasured: list[str]
+
+    @classmethod
+    def of(cls, report: Report, rows: Callable[[], Iterable[Row]]) -> FinishedRun:
+        """The run with that report; rows: returns its rows at each call."""
+        return cls(brief(report, rows(), KINDS), text.all_good(rows(), KINDS), _unmeasured(rows()))
+
+
+def _unmeasured(rows: Iterable[Row]) -> list[str]:
+    """The names of the third-party integrators of which no row has a number."""
+    measured: dict[str, bool] = {}
+    for row in rows:
+        subject = row.key.subject
+        if subject.what == "computed" and is_third_party(subject.name):
+            measured[subject.name] = measured.get(subject.name, False) or bool(row.metrics)
+    return [name for name, numbers in measured.items() if not numbers]
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +98,7 @@ class PlannedRun:
         checkpoint.require_same(report.plan, self.identity, self.directory)
         if self.parquet:
             parquet.write(self.directory / parquet.FILE, report.rows, report.plan)
-        return FinishedRun(brief(report, report.rows, KINDS), text.all_good(report.rows, KINDS))
+        return FinishedRun.of(report, lambda: report.rows)
 
     def measure(self, progress: Progress = unheard, begun: Progress = unheard) -> FinishedRun:
         """Measure the remaining rows, write the report and summarise it.
@@ -148,7 +164,7 @@ class PlannedRun:
         store.write(report, self.directory, rows())
         if len(self.tasks) <= MOST_ON_A_PAGE:
             page.write_report(replace(report, rows=list(rows())), self.directory / PAGE, KINDS)
-        return FinishedRun(brief(report, rows(), KINDS), text.all_good(rows(), KINDS))
+        return FinishedRun.of(report, rows)
 
 
 def prepare(

@@ -82,13 +82,17 @@ def gate(
     write_comparison(differences, markdown, junit, html)
     if bless:
         return _bless(ended, differences, (trusted, baseline), (fresh, out), json)
+    unmeasured = differences.exit_code is ExitCode.GOOD and ended.unmeasured
     if json:
-        print_json(differences.to_json())
+        print_json(differences.to_json() | ({"verdict": "incomparable"} if unmeasured else {}))
     else:
         print(f"{ended.summary}\n")
         by_rules = f" --policy {quote(str(rules))}" if rules else ""
         show = f"heavytop compare {quote(str(baseline))} {quote(str(out))}{by_rules} --full"
         show_on_terminal(comparison(differences, for_full=show))
+    if unmeasured:
+        say(f"incomparable: no row of {', '.join(unmeasured)} has a number.")
+        return ExitCode.INCOMPLETE
     return differences.exit_code
 
 
