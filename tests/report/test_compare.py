@@ -172,6 +172,15 @@ def test_what_neither_of_two_runs_that_stopped_reached_is_no_difference(word: st
     assert judged(ended("step_limit"), stopped)[0] == "incomparable"
 
 
+def test_rows_that_are_supported_in_neither_report_are_no_metrics() -> None:
+    lacking, measured = report(ended("unsupported", metrics={})), row(metrics={"drift_energy_max": error("1e-12")})
+    assert compare(lacking, lacking, Policy()).sentences == [
+        "Nothing is compared: 1 row is not supported in either report."
+    ]
+    both = report(*lacking.rows, replace(measured, case="other"))
+    assert compare(both, both, Policy()).sentences == ["Nothing changed: 1 metric is within the limits."]
+
+
 def test_a_failure_of_another_motion_says_nothing_of_this_one() -> None:
     data = Data(("2", "2", "1"), "1", ("0", "0", "1"), ("0", "0", "1"), ("1", "0", "0"))
     other = msgspec.structs.replace(data, weight="2")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from heavytop.features.kinds import KINDS
-from heavytop.records import SCHEMA, Law, Metric, Report, Row, Series
+from heavytop.records import SCHEMA, Against, Law, Metric, Report, Row, Series
 from heavytop.report.document.document import Card, Note
 from heavytop.report.render.terminal import LINES, MOST_ROWS, WIDTH, _lines, _shown, brief, fitted
 from heavytop.report.store import store
@@ -184,6 +184,11 @@ def test_a_card_has_its_title_alone_on_a_line_and_nothing_is_cut() -> None:
         first, *rest = _lines(_shown([card, card], brief=True))[: 1 + 2 * len(lines)]
         assert first == card.title
         assert " ".join(part.strip() for part in rest).startswith(" ".join(lines)[: 80 * len(lines)])
+
+
+def test_rows_that_are_not_supported_are_not_finished() -> None:
+    rows = [row(), row(case="lagrange", outcome="unsupported", metrics={}, reference=Against("none", reason="no"))]
+    assert "Plan p: 2 measurements, 1 finished, 1 not supported." in said(*rows)
 
 
 def test_one_measurement_is_no_plural() -> None:

@@ -146,7 +146,7 @@ def compare(
         + _differences(baseline.environment, candidate.environment),
         rows.same,
         [
-            *sentences(changes, same, rows.failed),
+            *sentences(changes, same, rows.failed, rows.unsupported),
             *(motion.sentence for motion in joined if motion.sentence),
             *unused,
         ],

@@ -239,16 +239,18 @@ class Sentence(NamedTuple):
     rows: frozenset[Identity]
 
 
-def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[str]:
+def sentences(changes: Changes, same: int, failed: Sequence[Row] = (), unsupported: int = 0) -> list[str]:
     """At most eight sentences, the most important first; losses before gains.
 
-    same: the number of unchanged metrics, where a row aborted in both reports counts as one.
-    failed: rows that failed in both reports, in the same way.
+    same: the number of unchanged metrics, where a row without metrics in both reports counts as one.
+    failed: rows that failed in both reports, in the same way.  unsupported: the number of rows so in both.
     """
     if not changes.rows:
-        counted = same - sum(row.outcome in UNMEASURED for row in failed)
+        counted = same - unsupported - sum(row.outcome in UNMEASURED for row in failed)
         numbers = f"{plural(counted, 'metric is', 'metrics are')} within the limits"
-        return [*([f"Nothing changed: {numbers}."] if counted else []), *_still_failed(failed), *_yardstick(changes)]
+        nothing = f"Nothing is compared: {plural(unsupported, 'row is', 'rows are')} not supported in either report."
+        said = [f"Nothing changed: {numbers}."] if counted else [nothing] if unsupported else []
+        return [*said, *_still_failed(failed), *_yardstick(changes)]
     orders = list(_orders(changes))
     ranked = [*_explained(changes), *(sentence for moved, sentence in orders if moved < 0)]
     by_rank = sorted(changes.rows, key=lambda change: RANK.index(change.verdict))

@@ -351,7 +351,8 @@ class RowComparison:
 
     timed: whether seconds are compared; repeated: whether those of repeated runs are.
     list_same: False to count unchanged metrics in :attr:`same` instead of listing them.
-    failed: rows of the candidate that failed in both reports, in the same way.
+    failed: rows of the candidate that failed in both reports, in the same way.  unsupported: the number of rows that
+    are not supported in both.
     checked: of the baseline and of the candidate, whether each row was already checked on reading.
     """
 
@@ -363,6 +364,7 @@ class RowComparison:
     repeated: bool = False
     same: int = field(default=0, init=False)
     failed: list[Row] = field(default_factory=list, init=False)
+    unsupported: int = field(default=0, init=False)
 
     def __post_init__(self) -> None:
         self.limits = Lookup(self.policy)
@@ -396,7 +398,9 @@ class RowComparison:
 
     def _whole_row(self, pair: RowPair, judged: Judged) -> list[Finding]:
         """The finding about a row that is judged as a whole."""
-        if judged[0] is Verdict.SAME and pair.new.outcome != UNSUPPORTED:
+        if judged[0] is Verdict.SAME and pair.new.outcome == UNSUPPORTED:
+            self.unsupported += 1
+        elif judged[0] is Verdict.SAME:
             self.failed.append(pair.new)
         if judged[0] is Verdict.SAME and not self.list_same:
             self.same += 1

@@ -108,17 +108,19 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
     first = list(islice(stream, MOST_ROWS + 1))
     failures: list[str] = []
     answers: list[Block] = []
-    number = bad = aborted = 0
+    number = bad = aborted = lacking = 0
 
     def counted(rows: Iterable[Row]) -> Iterable[Row]:
-        nonlocal number, bad, aborted
+        nonlocal number, bad, aborted, lacking
         for row in rows:
             number += 1
             if failed(row, kinds):
                 bad += 1
                 if len(failures) < _MOST_FAILURES:
                     failures.append(failure(row).strip())
-            elif row.outcome not in ("success", UNSUPPORTED):
+            elif row.outcome == UNSUPPORTED:
+                lacking += 1
+            elif row.outcome != "success":
                 aborted += 1
             yield row
 
@@ -132,7 +134,8 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
     else:
         parts = [_counted(counted(chain(first, stream)))]
     head = f"Plan {report.plan.get('name', '?')}: {plural(number, 'measurement')}, "
-    head += f"{bad} failed:" if bad else f"{aborted} aborted." if aborted else "all finished."
+    ended = f"{number - lacking} finished, {lacking} not supported." if lacking else "all finished."
+    head += f"{bad} failed:" if bad else f"{aborted} aborted." if aborted else ended
     if bad > len(failures):
         failures[-1:] = [f"and {bad - len(failures) + 1} more"]
     lines = [head, *(line for failure in failures for line in wrapped(f"  {failure}", "    ")[:_MOST_OF_ONE])]
