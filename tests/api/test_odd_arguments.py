@@ -140,6 +140,11 @@ def test_an_unknown_option_is_refused_as_python_refuses_it() -> None:
         ht.ensemble([TOP], START, [1], xi=None)
 
 
+def test_a_finder_that_returns_no_motion_is_refused() -> None:
+    with pytest.raises(ht.InputError, match="what finder returns must be an exact solution; got None"):
+        ht.reference(TOP, START, [1], finder=lambda *_: None)  # type: ignore[arg-type,return-value]
+
+
 def test_xi_without_attitude_is_refused() -> None:
     with pytest.raises(ht.InputError, match="xi was given with attitude=False"):
         ht.propagate(TOP, START, [1], xi=(0, 1, 0), attitude=False)

@@ -201,7 +201,8 @@ def test_integrators_of_a_plan_that_cannot_be_are_refused(tmp_path: Path, old: s
 
 
 def test_progress_names_the_row_that_is_running(tmp_path: Path) -> None:
-    tasks = read(str(plan(tmp_path, "heyoka", "multiword")), KINDS)[2]
+    tables = drift("euler", integrator="heyoka"), drift("euler", integrator="multiword")
+    tasks = read(plan_file(tmp_path, "".join(tables)), KINDS)[2]
     heard: list[str] = []
     for index, _ in rows(tasks, 1, begun=lambda task: heard.append(task.label)):
         assert heard[-1] == tasks[index].label

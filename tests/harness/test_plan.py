@@ -25,6 +25,7 @@ WORK = (
     "ladders = [{ integrator = 'heyoka', tolerances = ['1e-3', '0.001'] }]\n"
 )
 AUDIT = "[[measure]]\nkind = 'audit'\nclaims = ['ershkov-partial']\n"
+LIBRARY = AUDIT.replace("ershkov-partial", "library")
 CARRIED = AUDIT.replace("ershkov-partial", "sretensky-gyrostat")
 ONE = WORK.replace(", '0.001'", "")
 GROWTH = (
@@ -97,6 +98,11 @@ def test_the_asymptotic_case_tends_to_its_saddle_at_its_rate() -> None:
         (f"{AUDIT}systems = ['wheel']", "Unknown system 'wheel'"),
         (f"{AUDIT}systems = ['heavy_gyrostat']", "The paper makes no claim about heavy_gyrostat"),
         (f"{CARRIED}systems = ['gyrostat']", "sretensky-gyrostat is about heavy_gyrostat, but systems"),
+        (f"{LIBRARY}systems = ['gyrostat']", "is about heavy_top, but systems = ['gyrostat']"),
+        (f"{MEASURE}[[measure]]\nkind='drift'\ncases=[]\nruns=[]", "A [[measure]] of the plan"),
+        (f"{MEASURE}[[measure]]\nkind='local_error'\ncases=['euler']\nhorizon='1'\nprecisions=[]", "measures nothing"),
+        (f"{MEASURE}[[integrator]]\nname = 'mine'\ncommand = ['x']", "measures none of the integrators that it"),
+        ("[[measure]]\nkind = 'hunt'\nagainst = 'heyoka'", "integrator and against must differ"),
         (MEASURE.replace("euler", "oiler"), "Unknown case 'oiler'.   Did you mean euler?"),
         (MEASURE.replace("double", "float"), "Unknown precision 'float'"),
         (MEASURE.replace("10", "-10"), "positive"),

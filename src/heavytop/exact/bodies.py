@@ -10,7 +10,7 @@ from typing import cast
 
 from flint import arb
 
-from heavytop.errors import OutOfReach
+from heavytop.errors import OutOfReach, quoted, refusal
 from heavytop.exact.catalogue import find, state_and_attitude
 from heavytop.exact.closed_form import starting_at
 from heavytop.exact.enclosure.run import EFFORT, Validated
@@ -124,6 +124,9 @@ class BodyMotion:
             resolved = resolve(self.body, self.start, bits)
             if resolved.uncertainty is None:
                 solution = self.finder(resolved.top, resolved.start, self.system, self.effort)
+                if not hasattr(solution, "state"):
+                    remedy = "Return what heavytop.exact.catalogue.find returns."
+                    raise refusal("what finder returns", "an exact solution", quoted(solution), remedy)
             else:
                 solution = Validated(
                     resolved.top,

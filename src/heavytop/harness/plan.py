@@ -125,6 +125,9 @@ def read(
         if integrator:
             integrator = defined.get(integrator, integrator) if isinstance(integrator, str) else integrator
             plan = with_integrator(plan, integrator)
+        elif defined and defined.keys().isdisjoint(_integrators(plan)):
+            cause = f"The plan {plan.name} measures none of the integrators that it defines: {', '.join(defined)}."
+            raise InputError(cause, "Name one as the integrator of a [[measure]], or as --integrator.")
         if not isinstance(integrator, str):
             defined = defined | {integrator.name: integrator}
         return plan, digest, expand(plan, seed, defined)
@@ -232,6 +235,12 @@ def _by_name(
     return msgspec.structs.replace(plan, measure=list(map(by_name, plan.measure))), sources
 
 
+def _integrators(plan: Plan) -> set[str]:
+    """The names of the integrators that the tables of a plan measure."""
+    tables = [part for table in plan.measure for part in (table, *getattr(table, "ladders", ()))]
+    return {getattr(part, "integrator", "") for part in tables}
+
+
 def with_integrator(plan: Plan, integrator: str | IntegratorSource) -> Plan:
     """The plan with heyoka's measurements repeated for another integrator.
 
@@ -333,6 +342,9 @@ def expand(plan: Plan, seed: int = 0, defined: Mapping[str, IntegratorSource] | 
             _require_fit(task)
     if not labels:
         raise InputError(f"The plan {plan.name} measures nothing.", "Give it at least one [[measure]] with cases.")
+    if not all(templates for templates, _ in parts):
+        remedy = "Fill its lists of cases, claims, precisions, runs, ladders, directions, or remove it."
+        raise InputError(f"A [[measure]] of the plan {plan.name} measures nothing.", remedy)
     ends = list(accumulate(len(templates) * len(cases or (None,)) for templates, cases in parts))
 
     def task_at(index: int) -> Task:

@@ -304,9 +304,17 @@ def test_a_convention_of_an_array_that_is_not_given_is_refused(unused: dict) -> 
     top, start = ht.HeavyTop((3, 2, 1), 1, ("1/2", 0, 0)), ht.State((1, 0, 2), ("3/5", 0, "4/5"))
     states = [[*start.omega, *start.gamma]]
     columns = {"omega": [state[:3] for state in states], "gamma": [state[3:] for state in states]}
-    for given in ({"states": states}, columns):
+    for given in ({"states": states}, columns, {"omega": columns["omega"]}):
         with pytest.raises(InputError, match=f"{next(iter(unused))} was given"):
             ht.score([1], top=top, start=start, **given, **unused)
+
+
+def test_the_gamma_of_a_start_is_normalized_where_asked() -> None:
+    top, start = ht.HeavyTop((3, 2, 1), 1, ("1/2", 0, 0)), ht.State((1, 0, 2), (0.6, 0, 0.81))
+    states = ht.propagate(top, start.normalized(), [1]).to_numpy()
+    with pytest.raises(InputError, match="gamma is not a unit vector"):
+        ht.score([1], states, top=top, start=start)
+    assert ht.score([1], states, top=top, start=start, normalize=True, require=14).passed
 
 
 @pytest.mark.slow

@@ -51,6 +51,8 @@ class HuntTable(PlanTable, tag=NAME):
             raise InputError(f"budget must be from 1 to {_MOST} motions; got {self.budget}.", "Change the budget.")
         if self.limit and exact(self.limit) <= 0:
             raise InputError(f"limit must be positive; got {quoted(self.limit)}.", "Give a positive number.")
+        if self.against == self.integrator:
+            raise InputError("integrator and against must differ.", "Give another one, or leave out against.")
         if self.found:
             kept(Path(self.found))
         name = f"{self.family}-{self.seed}"

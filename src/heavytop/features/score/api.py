@@ -227,7 +227,7 @@ def score(
             "body_to_space" or "space_to_body".  matrices: shape (n, 3, 3), ``matrix`` in the same words.
         euler: shape (n, 3), intrinsic angles of ``sequence``, in ``angles`` "radians" or "degrees".
         up: the axis of space that points up: "z", "-z", "y", ...
-        normalize: take quaternions and matrices of any length for their directions.
+        normalize: take quaternions, matrices and the start's γ of any length for their directions.
 
     Returns:
         A :class:`Score`.
@@ -263,7 +263,7 @@ def score(
     said = Convention(**words, pivot=vector(pivot, "pivot"), point=where)
     _require_used(said, arrays, bool(state.attitude))
     if given is not None and set(arrays) == {"omega", "gamma"} and isinstance(body, HeavyTop) and not state.attitude:
-        _, state = arguments.motion(body, state)
+        _, state = arguments.motion(body, state.normalized() if flag else state)
         return scored(of_arrays(body, state, about, instants, given, form, *names), needed)
     if "euler" in arrays and not said.sequence:
         raise InputError("Euler angles need a sequence.", 'Give sequence, such as "ZXZ" or "ZYX".')
@@ -290,7 +290,7 @@ def _require_used(convention: Convention, arrays: Mapping[str, Any], attitude: b
     for word, (needed, name) in _USED_BY.items():
         if name not in arrays and getattr(convention, word) != getattr(usual, word):
             raise InputError(f"{word} was given without {needed}.", f"Give {needed}, or leave {word} out.")
-    if convention.up != usual.up and {"gamma"} <= set(arrays) <= {"omega", "gamma"} and not attitude:
+    if convention.up != usual.up and set(arrays) <= {"omega", "gamma"} and not attitude:
         raise InputError("up was given for states in body axes.", "Leave up out: γ points up, in body axes.")
 
 

@@ -52,11 +52,12 @@ class AuditTable(PlanTable, tag=NAME):
         requested = [system(name) for name in self.systems]
         if claim in PAPER:
             return tuple(paper_claim(claim).about(system).name for system in requested) or (HEAVY_TOP.name,)
-        if requested and claim in library() and (own := own_system(claim)) not in self.systems:
-            raise InputError(
-                f"The claim {claim} is about {own}, but systems = {quoted(list(self.systems))}.",
-                "Leave systems out: the file of an entry defines its system.",
-            )
+        for name in _entries(claim) if requested else ():
+            if (own := own_system(name)) not in self.systems:
+                raise InputError(
+                    f"The claim {name} is about {own}, but systems = {quoted(list(self.systems))}.",
+                    "Leave systems out: the file of an entry defines its system.",
+                )
         return ("",)
 
 
