@@ -262,6 +262,14 @@ def test_a_foreign_file_is_refused(tmp_path: Path, content: bytes) -> None:
         store.read(file)
 
 
+def test_bytes_that_are_no_text_in_a_row_are_refused(tmp_path: Path) -> None:
+    path = store.write(report(row()), tmp_path)
+    other = tmp_path / "other.json"
+    other.write_bytes(path.read_bytes().replace(b'"steps":10', b'"steps":10,"note":"\xff"'))
+    with pytest.raises(InputError, match="is not a whole report"):
+        ht.compare(path, other)
+
+
 def test_a_missing_report_and_a_row_twice_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no report"):
         store.read(tmp_path)

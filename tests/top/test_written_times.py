@@ -3,6 +3,7 @@
 from decimal import Decimal
 from fractions import Fraction
 
+import gmpy2
 import numpy as np
 import pytest
 
@@ -24,6 +25,7 @@ START = ht.State(("1/5", "-1/3", "7/4"), ("2/7", "3/7", "6/7"))
         ("-0.50", "-0.50"),
         (Fraction(1, 3), "1/3"),
         (Fraction(1, 2), "1/2"),
+        (Fraction(gmpy2.mpz(1), gmpy2.mpz(3)), "1/3"),
         (Decimal("0.10"), "0.10"),
         (7, "7"),
         (np.int32(-7), "-7"),

@@ -295,7 +295,7 @@ class TimeText(str):
         if isinstance(value, Decimal):
             return cls(str(value))
         if isinstance(value, Fraction):
-            return cls(exact_text(value))
+            return cls(exact_text(number))
         twos = (number.denominator & -number.denominator).bit_length() - 1
         decimals = twos  # of a binary number; of any other the division below leaves a rest
         if number.denominator != 1 << twos or decimals > _LONGEST:

@@ -192,7 +192,7 @@ def _read(path: Path, kind: type[_Content]) -> tuple[Path, _Content]:
         content = read_whole(file)
         if file.suffix == ".gz":
             content = gzip.decompress(content)
-    except (OSError, EOFError, zlib.error) as error:
+    except (OSError, EOFError, ValueError, zlib.error) as error:
         reports = sorted(entry.parent.name for entry in file.parent.glob(f"*/{FILE}*"))
         remedy = (
             f"Name one of the reports in {str(file.parent)[:_NAME]}: {', '.join(dict.fromkeys(reports))}."
@@ -234,7 +234,7 @@ def _check_repeats(file: Path, content: bytes) -> None:
         json.loads(content, object_pairs_hook=without_repeats)
     except InputError as error:
         raise InputError(f"{file}: {error.cause}", REMEDY) from None
-    except RecursionError as error:
+    except _UNREADABLE as error:
         raise InputError(f"{file} is not a whole report: {error}.", REMEDY) from None
 
 
