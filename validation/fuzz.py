@@ -229,7 +229,7 @@ class Inputs:
         return kind(random_)
 
     def command(self, *arguments: object) -> tuple[str, Callable[[], object]]:
-        texts = [str(argument) for argument in arguments]
+        texts = [str(argument).replace("\0", "") for argument in arguments]  # no system passes a NUL on
 
         def call() -> object:
             sys.argv = ["heavytop", *texts]
