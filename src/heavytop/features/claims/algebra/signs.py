@@ -161,11 +161,12 @@ class Signs:
                 self.declare(candidates[0], sign)
 
     def _declare_each(self, factors: list[fmpq_mpoly], known: Sign) -> None:
-        """Two factors with a product > 0 have the sign of their sum; with a product < 0, of their difference."""
+        """None is 0; two with a product > 0 have the sign of their sum, with a product < 0, of their difference."""
+        if known.strict:
+            self._facts += [(factor, Sign(0, True)) for factor in factors]
         if len(factors) != 2 or not (known.value and known.strict):
             return
         first, second = factors
-        self._facts += [(factor, Sign(0, True)) for factor in factors]
         total = self.of(first + second * known.value)
         if total.value and total.strict:
             self._facts += [(first, Sign(total.value, True)), (second, Sign(total.value * known.value, True))]

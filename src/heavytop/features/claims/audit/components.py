@@ -30,8 +30,9 @@ from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.prover import shortest
 from heavytop.features.claims.algebra.rational import forces_zero
 from heavytop.features.claims.algebra.reader import Formula, parse, symbol
-from heavytop.features.claims.algebra.statement import AFTER, ALL, TIME, Flow, Formulas, Point, Setting, Statement
-from heavytop.features.claims.algebra.structure import at_values, rate_along, rational_values
+from heavytop.features.claims.algebra.signs import PLUS
+from heavytop.features.claims.algebra.statement import AFTER, ALL, TIME, Domain, Flow, Formulas, Point, Setting, Statement
+from heavytop.features.claims.algebra.structure import at_values, rate_along, rational_values, sign_of
 from heavytop.features.claims.audit.context import (
     DOMAINS,
     STATE,
@@ -266,6 +267,7 @@ class UserComponent(UserIntegral):
             f, needs = self._square.expression, self._square.needs
             claims.append(("reduced", 1, f, slope**2, one, "u'^2 = f(u)", needs))
             claims.append(("reduced", 2, sympy.diff(f, u) / 2, rate(slope), one, "u'' = f'(u)/2", needs))
+            in_u += self._clock(f, moved.points)
         for index, name in enumerate(_ANGLES, 1):
             claimed = self._of(name, self.content.quadrature)
             if claimed is not None:
@@ -276,13 +278,15 @@ class UserComponent(UserIntegral):
             raise InputError("[component] makes no claim.", "Give reduced, or rates of angles in [quadrature].")
         zeros = [*(part.expression for part in self.where), OFF_SPHERE]
         known = self._known_components()
+        lasting = all(sympy.expand(e) == 0 for _, e in kept)
         for equation, index, claimed, above, below, text, needs in claims:
             pole = _POLE if equation == "rate" else ""
             of_u = claimed.xreplace(known)
-            through = None if of_u.free_symbols & frozenset(STATE) else _through(u, q.expression, zeros, (above, below))
+            is_of_u = lasting and not of_u.free_symbols & frozenset(STATE)
+            through = _through(u, q.expression, zeros, (above, below)) if is_of_u else None
             put = known if through else {u: q.expression}
             needs = frozenset(_off_pole(need, u if through else None) for need in _put(needs, put))
-            if through is not None and all(sympy.expand(e) == 0 for _, e in kept):
+            if through is not None:
                 residual = sympy.numer(sympy.together(of_u * through[1] - through[0]))
                 needs = _without(base, *STATE) | needs | condition("/", (through[2],))
                 sampled, domain = (needs | of_time, moved) if equation == "reduced" else (needs, ALL)
@@ -297,6 +301,28 @@ class UserComponent(UserIntegral):
                 formulas = Formulas(STATE, needs, pole=pole, sampled=sampled)
                 on_state.append(Statement(equation, index, "smooth", _AT_A_STATE, residual, text, formulas, flow))
         return in_u, on_state
+
+    def _clock(self, f: sympy.Expr, points: tuple[Fraction, ...]) -> Iterator[Statement]:
+        """F is continuous and F' keeps its sign where u moves: f(u) > 0 there, and so are radicands that divide f."""
+        clock, u = self._quadrature, self._u
+        if clock is None:
+            return
+        is_time = self.content.quadrature.time is not None
+        slope = rate_along({u: sympy.Integer(1)})(clock.expression) if is_time else clock.expression
+        factors = (factor.as_base_exp() for factor in sympy.Mul.make_args(slope))
+        if not is_time and all(n.q == 2 or sign_of(p).strict or self._divides(p, f) for p, n in factors):
+            return
+        positive = (need.expression for need in sorted(clock.needs, key=str) if need.kind is not ConditionKind.NONZERO)
+        facts = (f, *(radicand for radicand in positive if self._divides(radicand, f)))
+        domain = Domain("f(u) > 0", 0, points, f"{u} is the component", facts)
+        values = (*((clock.expression,) if is_time else ()), slope, 1 / slope)
+        text = "t = F(u) is continuous, and F' keeps its sign"
+        yield Statement("time", 1, "smooth", domain, sympy.Integer(0), text, Formulas(values))
+
+    def _divides(self, p: sympy.Expr, f: sympy.Expr) -> bool:
+        """Whether a polynomial in u, or a constant, is 0 only where f is: so it keeps its sign where u moves."""
+        cofactor = sympy.cancel(f / p)
+        return p.is_polynomial(self._u) and self._u not in sympy.gcd(p, sympy.denom(cofactor)).free_symbols
 
     def _rates(self, system: System) -> tuple[sympy.Expr, sympy.Expr, sympy.Expr]:
         """u, u' and u'' on the state."""
@@ -376,9 +402,9 @@ class UserComponent(UserIntegral):
 
 
 def _is_square(e: sympy.Expr) -> bool:
-    """Whether it is a positive number times the square of a rational function."""
-    constant, factors = sympy.factor_list(sympy.numer(e) * sympy.denom(e))
-    return constant.is_positive is True and all(power % 2 == 0 for _, power in factors)
+    """Whether it is a positive expression times the square of a rational function."""
+    factors = sympy.Mul.make_args(sympy.factor(sympy.numer(e) * sympy.denom(e)))
+    return all(factor.as_base_exp()[1].is_even or sign_of(factor) == PLUS for factor in factors)
 
 
 def _after(rates: Sequence[_Value], time: Fraction) -> _Value:
