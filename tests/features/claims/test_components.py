@@ -144,6 +144,9 @@ def test_a_function_of_time_is_smooth_and_defined_from_its_start(value: str, dom
     [
         ("Omega1", "1/sqrt(1 - u^2)", "holds"),
         ("Omega1", "1/(sqrt(1 - u)*sqrt(1 + u))", "holds"),
+        ("Omega1", "sqrt(1/(1 - u))*sqrt(1/(1 + u))", "holds"),
+        ("Omega1", "sqrt(1/(u - 1))*sqrt(1/(-1 - u))", "undecided"),
+        ("Omega1", "sqrt(u^2)/(u*sqrt(1 - u^2))", "undecided"),  # changes its sign at u = 0
         ("Omega1", "sqrt(-1 - u^2)/(sqrt(1 + u^2)*sqrt(u^2 - 1))", "undecided"),
         ("Omega1", "1/sqrt(1 - u^2) + 0*log(u - 5)", "undecided"),
         ("exp(Omega1)", "1/(u*sqrt(1 - log(u)^2))", "holds"),
@@ -154,6 +157,65 @@ def test_an_integrand_is_real_where_the_component_moves(quantity: str, integrand
     component = {"quantity": quantity, "constants": ["Omega3"]}
     table = CIRCLE | {"component": component, "quadrature": {"variable": "u", "integrand": integrand}}
     assert audited(table).verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("time", "verdict"),
+    [
+        ("asin(u)", "holds"),
+        ("atan(u/sqrt(1 - u^2))", "holds"),
+        ("-atan(sqrt(1 - u^2)/u)", "undecided"),  # jumps at u = 0
+        ("asin(2*u*sqrt(1 - u^2))/2", "undecided"),  # decreases beyond u = 1/√2
+    ],
+)
+def test_the_clock_of_a_component_neither_jumps_nor_turns(time: str, verdict: str) -> None:
+    component = {"quantity": "Omega1", "constants": ["Omega3"]}
+    table = CIRCLE | {"component": component, "quadrature": {"variable": "u", "time": time}}
+    assert audited(table).verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("quantity", "value"), [("asin(Omega1)", "pi/2 - t"), ("acos(Omega1)", "t"), ("atan2(-Omega2, Omega1)", "t")]
+)
+def test_a_component_with_kinks_or_jumps_is_no_smooth_function_of_time(quantity: str, value: str) -> None:
+    """Each of them is true until Ω1 = cos t turns, or the angle is π."""
+    start = {"omega": ["3/5", "-4/5", "2"], "gamma": ["0", "0", "1"]}
+    begin = {"pi/2 - t": "asin(3/5) - t", "t": "t + acos(3/5)"}[value]
+    component = {"quantity": quantity, "constants": ["Omega3"], "reduced": "1", "value": begin}
+    assert audited(CIRCLE | {"start": start, "component": component}).verdict == "undecided"
+
+
+def test_a_reduced_equation_is_not_refuted_beyond_the_way_of_its_component() -> None:
+    """|1 − u²| is 1 − u² where u moves."""
+    component = CIRCLE["component"] | {"reduced": "sqrt((1 - u^2)^2)"}
+    assert audited(CIRCLE | {"component": component}).verdict == "undecided"
+
+
+PENDULUM: dict[str, Any] = {
+    "kind": "component",
+    "assume": ["I > 0", "P > 0", "w > 0"],
+    "parameters": {"I": ["2", "1"], "P": ["1", "3/4"], "w": ["3", "4"]},
+    "top": top("I 2 3", "0 0 1", "P"),
+    "start": {"omega": ["w", "0", "0"], "gamma": ["0", "0", "-1"]},
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("quantity", "integrand", "verdict"),
+    [
+        ("gamma3", "1/sqrt((1 - u^2)*(w^2 - 2*P/I*(1 + u)))", "holds"),
+        ("gamma3", "1/sqrt((1 - u^2)*(w^2 + 2*P/I*(1 + u)))", "refuted"),  # by a derivative of order 4
+        ("gamma3", "1/sqrt((1 - u^2)*(w^2 - 2*P/I*(1 - u)))", "refuted"),
+        ("Omega1", "I/(P*sqrt(1 - (I/(2*P)*(w^2 - u^2) - 1)^2))", "holds"),
+        ("Omega1", "2/(sqrt(w - u)*sqrt(w + u)*sqrt(u - sqrt(w^2 - 4*P/I))*sqrt(u + sqrt(w^2 - 4*P/I)))", "holds"),
+    ],
+)
+def test_a_pendulum_starts_at_a_zero_of_its_reduced_equation(quantity: str, integrand: str, verdict: str) -> None:
+    component = {"quantity": quantity, "constants": ["Omega2", "Omega3", "gamma1"]}
+    table = PENDULUM | {"component": component, "quadrature": {"variable": "u", "integrand": integrand}}
+    assume = [*PENDULUM["assume"], "I*w^2 > 4*P"]
+    assert audited(table | {"assume": assume}).verdict == verdict
 
 
 EULER_FROM_TWO_AXES = {

@@ -506,7 +506,7 @@ class Prover:
     def is_defined(self, statement: Statement, point: Point) -> bool:
         """Whether every formula and the residual is certainly defined and real at a point."""
         formulas = statement.formulas
-        needs = formulas.sampled or formulas.needs | formulas.angle_needs
+        needs = formulas.needs | formulas.angle_needs if formulas.sampled is None else formulas.sampled
         key = needs, frozenset(point.items())
         if key not in self._met:
             self._met[key] = all(need.is_met(point) for need in needs)
@@ -576,7 +576,7 @@ def _missed(statement: Statement, setting: Setting) -> str:
                 where = f"where {', '.join(parts)}, {written(str(zero))} is not 0"
                 return f"no sample lies on the relations{on_sphere}: {where}"
         if not setting.zeros and statement.domain.facts:
-            points = ", ".join(map(str, statement.domain.points))
+            points = ", ".join(map(shown, statement.domain.points))
             return f"no point tried lies where {statement.domain.label}: {setting.variable} = {points}"
     return f"no sample is proven to lie on the relations{on_sphere}"
 

@@ -46,7 +46,7 @@ class Formulas:
     values: must be real and continuous on the whole domain.  needs: of these.
     attitude: functions of the angles that must be continuous inside the domain.  angle_needs: of the angles.
     pole: the condition under which the angles are defined, where they are not on the whole domain.
-    sampled: the needs in the symbols of the samples, where ``needs`` have symbols for first integrals.
+    sampled: the needs at a sample; None for all, where these have no symbols for first integrals.
     """
 
     values: tuple[sympy.Expr, ...] = ()
@@ -54,7 +54,7 @@ class Formulas:
     attitude: tuple[sympy.Expr, ...] = ()
     angle_needs: frozenset[Need] = frozenset()
     pole: str = ""
-    sampled: frozenset[Need] = frozenset()
+    sampled: frozenset[Need] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,15 +9,17 @@ quadrature t = ∫ du/√f(u) and the rates of angles are statements on the stat
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
-from typing import TypeVar
+from itertools import product
 
 import sympy
 from msgspec import structs
 
 from heavytop.errors import InputError
+from heavytop.exact.flint.balls import midpoint
 from heavytop.features.claims.algebra.conditions import (
     ConditionKind,
     Need,
@@ -26,12 +28,24 @@ from heavytop.features.claims.algebra.conditions import (
     is_exactly_zero,
     written,
 )
+from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.prover import shortest
 from heavytop.features.claims.algebra.rational import forces_zero
 from heavytop.features.claims.algebra.reader import Formula, parse, symbol
+from heavytop.features.claims.algebra.ring import Unprovable
 from heavytop.features.claims.algebra.signs import PLUS
-from heavytop.features.claims.algebra.statement import AFTER, ALL, TIME, Domain, Flow, Formulas, Point, Setting, Statement
+from heavytop.features.claims.algebra.statement import (
+    AFTER,
+    ALL,
+    TIME,
+    Domain,
+    Flow,
+    Formulas,
+    Point,
+    Setting,
+    Statement,
+)
 from heavytop.features.claims.algebra.structure import at_values, rate_along, rational_values, sign_of
 from heavytop.features.claims.audit.context import (
     DOMAINS,
@@ -54,8 +68,8 @@ _POLE = "gamma is not vertical in the body: elsewhere phi and psi are undefined"
 _IN_TIME = rate_along({TIME: sympy.Integer(1)})
 _AT_A_STATE = replace(ALL, points=(Fraction(0),))
 _ANGLES = ("phi", "theta", "psi")
-_SHORTLY = Fraction(1, 2**16)
-_Value = TypeVar("_Value", sympy.Expr, Fraction)
+_SHORT_TIMES = sympy.Rational(1, 2**8), sympy.Rational(1, 2**64)
+_BITS = 256
 _FROM_START = DOMAINS | {"t>0": replace(AFTER, label="t>=0")}
 """The domains of a function of time with its start, which belongs to it."""
 
@@ -188,20 +202,27 @@ class UserComponent(UserIntegral):
             return
         if need.kind is ConditionKind.NONZERO:
             for base in (factor.as_base_exp()[0] for factor in sympy.Mul.make_args(radicand)):
-                common = sympy.gcd(base, sympy.denom(sympy.cancel(f / base)))
-                if common.free_symbols and not for_no_parameters(base, self.setting.assumptions(0), ()):
+                numerator = sympy.numer(sympy.together(base))
+                common = sympy.gcd(numerator, sympy.denom(sympy.cancel(f / base)))
+                if common.free_symbols and not for_no_parameters(numerator, self.setting.assumptions(0), ()):
                     yield Need(ConditionKind.NONZERO, base)
             return
+        radicand = sympy.prod(sympy.fraction(sympy.together(radicand)))
         cofactor = sympy.cancel(f / radicand)
         if cofactor.is_rational_function(u) and _is_square(cofactor):
             return
-        is_polynomial = self.start and radicand.is_polynomial(u) and cofactor.is_rational_function(u)
+        is_continuous = self.start and not self.quantity.expression.has(sympy.atan2)
+        is_polynomial = is_continuous and radicand.is_polynomial(u) and cofactor.is_rational_function(u)
         if not is_polynomial or u in sympy.gcd(radicand, sympy.denom(cofactor)).free_symbols:
             yield need
             return
-        begin = {u: self._at_start(self.quantity.expression)}
+        yield Need(ConditionKind.POSITIVE, self._at_begin(radicand, cofactor))
+
+    def _at_begin(self, radicand: sympy.Expr, cofactor: sympy.Expr) -> sympy.Expr:
+        """An expression with the sign that the radicand has after the start."""
+        begin = {self._u: self._at_start(self.quantity.expression)}
         at_start = sympy.factor(radicand.xreplace(begin))
-        yield Need(ConditionKind.POSITIVE, at_start if at_start != 0 else sympy.factor(cofactor.xreplace(begin)))
+        return at_start if at_start != 0 else sympy.factor(cofactor.xreplace(begin))
 
     def _of(self, name: str, table: QuadratureTable | ComponentTable | None) -> Formula | None:
         """A formula of a table, which may contain t in [component]; None where absent."""
@@ -258,16 +279,15 @@ class UserComponent(UserIntegral):
         omega = tuple(system.angular_velocity(self.context.parameters(system), STATE))
         in_u: list[Statement] = []
         on_state: list[Statement] = []
-        # an integrand may be real between two values of u alone: it must be where u moves
-        of_time: frozenset[Need] = frozenset() if self._quadrature is None else self._quadrature.needs
-        moved = replace(ALL, points=self._shortly_after(system)) if of_time else ALL
         claims: list[tuple[str, int, sympy.Expr, sympy.Expr, sympy.Expr, str, frozenset[Need]]] = []
         one, slope = sympy.Integer(1), rate(q.expression)
         if self._square is not None:
             f, needs = self._square.expression, self._square.needs
             claims.append(("reduced", 1, f, slope**2, one, "u'^2 = f(u)", needs))
             claims.append(("reduced", 2, sympy.diff(f, u) / 2, rate(slope), one, "u'' = f'(u)/2", needs))
-            in_u += self._clock(f, moved.points)
+            # between the values of u on its way two functions may differ that agree on it
+            moved = ALL if f.is_rational_function(u) else replace(ALL, points=self._shortly_after(system))
+            in_u += self._clock(f, system)
         for index, name in enumerate(_ANGLES, 1):
             claimed = self._of(name, self.content.quadrature)
             if claimed is not None:
@@ -288,36 +308,53 @@ class UserComponent(UserIntegral):
             needs = frozenset(_off_pole(need, u if through else None) for need in _put(needs, put))
             if through is not None:
                 residual = sympy.numer(sympy.together(of_u * through[1] - through[0]))
-                needs = _without(base, *STATE) | needs | condition("/", (through[2],))
-                sampled, domain = (needs | of_time, moved) if equation == "reduced" else (needs, ALL)
-                formulas = Formulas((u,), needs, pole=pole, sampled=sampled)
+                at_samples = _without(base, *STATE) | condition("/", (through[2],))
+                needs |= at_samples
+                formulas = Formulas((u,), needs, pole=pole, sampled=at_samples if equation == "reduced" else needs)
+                domain = moved if equation == "reduced" else ALL
                 in_u.append(Statement(equation, index, "smooth", domain, residual, text, formulas))
             elif index == 1 or equation == "rate":
                 residual = sympy.numer(sympy.together(claimed.xreplace({u: q.expression}) * below - above))
                 flow = Flow(rate, frozenset(STATE), kept, False, (OFF_SPHERE,))
                 needs |= base
-                after = _after(self._rates(system), _SHORTLY)
-                sampled = needs | _put(of_time, {u: after}) if equation == "reduced" else needs
-                formulas = Formulas(STATE, needs, pole=pole, sampled=sampled)
+                # a function of time has no kink, and so must be u
+                smooth = (q.expression, slope) if equation == "reduced" and self._component.value else ()
+                sampled = base if equation == "reduced" else needs
+                formulas = Formulas((*STATE, *smooth), needs, pole=pole, sampled=sampled)
                 on_state.append(Statement(equation, index, "smooth", _AT_A_STATE, residual, text, formulas, flow))
         return in_u, on_state
 
-    def _clock(self, f: sympy.Expr, points: tuple[Fraction, ...]) -> Iterator[Statement]:
-        """F is continuous and F' keeps its sign where u moves: f(u) > 0 there, and so are radicands that divide f."""
-        clock, u = self._quadrature, self._u
-        if clock is None:
+    def _clock(self, f: sympy.Expr, system: System) -> Iterator[Statement]:
+        """F is continuous and F' real and of one sign where u moves: f(u) > 0 there, as are radicands that divide f.
+
+        That they are real is a condition of the reduced equation, which a state refutes where they are not.
+        """
+        clock, u, table = self._quadrature, self._u, self.content.quadrature
+        if clock is None or table is None:
             return
-        is_time = self.content.quadrature.time is not None
-        slope = rate_along({u: sympy.Integer(1)})(clock.expression) if is_time else clock.expression
+        slope = clock.expression if table.time is None else rate_along({u: sympy.Integer(1)})(clock.expression)
         factors = (factor.as_base_exp() for factor in sympy.Mul.make_args(slope))
-        if not is_time and all(n.q == 2 or sign_of(p).strict or self._divides(p, f) for p, n in factors):
-            return
+        has_one_sign = all(n.q == 2 or sign_of(p).strict or self._divides(p, f) for p, n in factors)
+        values = () if has_one_sign and table.time is None else (slope, 1 / slope)
+        values += () if table.time is None else (clock.expression,)
         positive = (need.expression for need in sorted(clock.needs, key=str) if need.kind is not ConditionKind.NONZERO)
-        facts = (f, *(radicand for radicand in positive if self._divides(radicand, f)))
-        domain = Domain("f(u) > 0", 0, points, f"{u} is the component", facts)
-        values = (*((clock.expression,) if is_time else ()), slope, 1 / slope)
-        text = "t = F(u) is continuous, and F' keeps its sign"
-        yield Statement("time", 1, "smooth", domain, sympy.Integer(0), text, Formulas(values))
+        facts = (f, *(radicand for radicand in positive if self._divides(radicand, f)), *self._signed_factors(f))
+        domain = Domain("f(u) > 0", 0, self._shortly_after(system), f"{u} is the component", facts)
+        text = "t = F(u) is continuous, and F' is real and keeps its sign"
+        yield Statement("time", 1, "smooth", domain, sympy.Integer(0), text, Formulas(values, sampled=clock.needs))
+
+    def _signed_factors(self, f: sympy.Expr) -> Iterator[sympy.Expr]:
+        """The factors of a rational f(u) that have a known sign at the start, which they keep, times that sign."""
+        if not self.start or not f.is_rational_function(self._u):
+            return
+        for factor in sympy.Mul.make_args(sympy.factor(sympy.numer(sympy.together(f)))):
+            p, _ = factor.as_base_exp()
+            if self._u in p.free_symbols:
+                with suppress(Unprovable):
+                    begin = self._at_begin(p, sympy.cancel(f / p))
+                    field = Field(self.setting.assumptions(0), [begin])
+                    sign = field.tower.sign(field.enter(begin))
+                    yield from [sign.value * p] if sign.value and sign.strict else []
 
     def _divides(self, p: sympy.Expr, f: sympy.Expr) -> bool:
         """Whether a polynomial in u, or a constant, is 0 only where f is: so it keeps its sign where u moves."""
@@ -331,10 +368,13 @@ class UserComponent(UserIntegral):
 
     def _shortly_after(self, system: System) -> tuple[Fraction, ...]:
         """Values of u on the way of the motion from each sample, to the second order in a short time."""
+        u, speed, acceleration = self._rates(system)
+        after = [u + speed * time + acceleration * time**2 / 2 for time in _SHORT_TIMES]
         points: dict[Fraction, None] = {}
-        for sample in self.at_states.samples:
-            if values := rational_values(self._rates(system), sample):
-                points |= dict.fromkeys(_after(values, time) for time in (Fraction(1, 2**8), _SHORTLY))
+        for sample, value in product(self.at_states.samples, after):
+            with suppress(Unprovable):
+                ball = evaluate(value, sample, _BITS)
+                points |= {midpoint(ball): None} if ball.is_finite() else {}
         return tuple(points)
 
     def _known_components(self) -> dict[sympy.Expr, sympy.Expr]:
@@ -405,12 +445,6 @@ def _is_square(e: sympy.Expr) -> bool:
     """Whether it is a positive expression times the square of a rational function."""
     factors = sympy.Mul.make_args(sympy.factor(sympy.numer(e) * sympy.denom(e)))
     return all(factor.as_base_exp()[1].is_even or sign_of(factor) == PLUS for factor in factors)
-
-
-def _after(rates: Sequence[_Value], time: Fraction) -> _Value:
-    """u after a short time, to the second order, by u, u' and u''."""
-    u, speed, acceleration = rates
-    return u + speed * time + acceleration * time**2 / 2
 
 
 def _is_at(state: Mapping[sympy.Symbol, Fraction], zeros: Iterable[sympy.Expr]) -> bool:

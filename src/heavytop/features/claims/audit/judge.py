@@ -43,6 +43,8 @@ _BITS = (192, 1024)
 _MOST_BITS = 300_000
 """The largest exponent of 2 of a residual written as exact text: that of decimal text ends at 10^100000."""
 _LONGEST = 160
+_ORDERS, _MOST_OPERATIONS = 4, 4_000
+"""The derivatives of a residual tried for a witness, and the largest number of operations of one to derive."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,8 +207,17 @@ def _judge_one(statement: Statement, setting: Setting, prover: Prover) -> Statem
                 return _row(statement, False, left, conditions, witness)
     if certain:
         return _row(statement, True, "0", conditions)
-    residual = "0 if the conditions hold" if proven else _bound(statement, prover)
-    return _row(statement, None, residual, conditions)
+    residual = statement.residual
+    for order in range(1, _ORDERS + 1):
+        if flow is None or sympy.count_ops(residual) > _MOST_OPERATIONS:
+            break
+        residual = flow.rate(residual)
+        witness = next(_witnesses(replace(statement, residual=residual), setting, prover), None)
+        if witness is not None:
+            left = f"0 at the witness, its derivative of order {order} {witness['value']}"
+            return _row(statement, False, left, conditions, witness)
+    bound = "0 if the conditions hold" if proven else _bound(statement, prover)
+    return _row(statement, None, bound, conditions)
 
 
 def _row(
