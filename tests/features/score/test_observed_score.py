@@ -309,6 +309,19 @@ def test_a_convention_of_an_array_that_is_not_given_is_refused(unused: dict) -> 
             ht.score([1], top=top, start=start, **given, **unused)
 
 
+def test_a_convention_of_no_column_is_reported(tmp_path: Path) -> None:
+    keys = {"inertia": "3, 2, 1", "weight": "1", "centre": "1/2, 0, 0", "omega": "1, 0, 2", "gamma": "3/5, 0, 4/5"}
+    table = "t,omega1,omega2,omega3,gamma1,gamma2,gamma3\n1,1,0,2,0.6,0,0.8\n"
+    unused = {"sequence": "ZXZ", "angles": "degrees", "up": "y", "pivot": "1, 2, 3", "matrix": "space_to_body"}
+    file = tmp_path / "motion.csv"
+    for key, value in unused.items():
+        file.write_text("".join(f"# {key}: {value}\n" for key, value in (keys | {key: value}).items()) + table)
+        assert f"ignored keys: {key}" in read(file).warnings()
+    file.write_text("# link: arm\n" + table)
+    with pytest.raises(InputError, match="link was given without file"):
+        read(file)
+
+
 def test_the_gamma_of_a_start_is_normalized_where_asked() -> None:
     top, start = ht.HeavyTop((3, 2, 1), 1, ("1/2", 0, 0)), ht.State((1, 0, 2), (0.6, 0, 0.81))
     states = ht.propagate(top, start.normalized(), [1]).to_numpy()

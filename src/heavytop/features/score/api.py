@@ -16,6 +16,7 @@ from heavytop.display import Tabular, TitledTable, plural
 from heavytop.errors import ExitCode, InputError, quoted
 from heavytop.features.score.measurement import Assessment, assess, passed
 from heavytop.features.score.text import diagnosis_text, score_report, to_json
+from heavytop.features.score.trajectories.columns import USED_BY, unused
 from heavytop.features.score.trajectories.observed import (
     GivenTrajectory,
     of_arrays,
@@ -261,7 +262,7 @@ def score(
     state = arguments.is_a(start, State, "start")
     where = None if point is None else vector(point, "point")
     said = Convention(**words, pivot=vector(pivot, "pivot"), point=where)
-    _require_used(said, arrays, bool(state.attitude))
+    _require_used(said, {*arrays, *(["attitude"] if state.attitude else [])})
     if given is not None and set(arrays) == {"omega", "gamma"} and isinstance(body, HeavyTop) and not state.attitude:
         _, state = arguments.motion(body, state.normalized() if flag else state)
         return scored(of_arrays(body, state, about, instants, given, form, *names), needed)
@@ -272,26 +273,16 @@ def score(
     return scored(trajectory, needed)
 
 
-_USED_BY = {
-    "quaternion_order": ("quaternions", "quaternion"),
-    "quaternion": ("quaternions", "quaternion"),
-    "matrix": ("matrices", "matrix"),
-    "sequence": ("euler", "euler"),
-    "angles": ("euler", "euler"),
-    "pivot": ("positions", "position"),
-    "point": ("positions", "position"),
-}
-"""The argument that each convention is about, and its name among the columns."""
+_ARGUMENTS = {"quaternion": "quaternions", "matrix": "matrices", "euler": "euler", "position": "positions"}
 
 
-def _require_used(convention: Convention, arrays: Mapping[str, Any], attitude: bool) -> None:
+def _require_used(convention: Convention, quantities: set[str]) -> None:
     """Raises InputError for a convention, other than by default, of an array that was not given."""
-    usual = Convention()
-    for word, (needed, name) in _USED_BY.items():
-        if name not in arrays and getattr(convention, word) != getattr(usual, word):
-            raise InputError(f"{word} was given without {needed}.", f"Give {needed}, or leave {word} out.")
-    if convention.up != usual.up and set(arrays) <= {"omega", "gamma"} and not attitude:
-        raise InputError("up was given for states in body axes.", "Leave up out: γ points up, in body axes.")
+    for word in unused(convention, quantities):
+        if word == "up":
+            raise InputError("up was given for states in body axes.", "Leave up out: γ points up, in body axes.")
+        needed = _ARGUMENTS[USED_BY[word]]
+        raise InputError(f"{word} was given without {needed}.", f"Give {needed}, or leave {word} out.")
 
 
 def read_trajectory(

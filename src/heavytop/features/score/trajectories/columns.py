@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import inf
@@ -397,6 +397,23 @@ def convention(document: Mapping[str, Any], header: Header | None = None) -> Con
         if document.get(key) is not None:
             stated[key] = vector(_numbers(document[key], key, 3), key)
     return Convention(**stated)
+
+
+USED_BY = {
+    **dict.fromkeys(("quaternion_order", "quaternion"), "quaternion"),
+    "matrix": "matrix",
+    **dict.fromkeys(("sequence", "angles"), "euler"),
+    **dict.fromkeys(("pivot", "point"), "position"),
+}
+"""The quantity that each convention is about; ``up`` is about all but Ω and γ."""
+
+
+def unused(convention: Convention, quantities: Iterable[str]) -> list[str]:
+    """The conventions, other than by default, that are about none of the quantities of a motion and its start."""
+    usual, there = Convention(), set(quantities)
+    words = [word for word, name in USED_BY.items() if name not in there]
+    words += ["up"] if there <= {"omega", "gamma"} else []
+    return [word for word in words if getattr(convention, word) != getattr(usual, word)]
 
 
 def _is_direction(value: object) -> bool:

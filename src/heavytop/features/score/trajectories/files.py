@@ -103,7 +103,8 @@ def read_table(text: str, started: bool = False) -> tuple[dict[str, Any], list[s
     if keys.get("attitude") == "rotation vector":
         names = [re.sub(r"^r_?([xyz])\b", r"rotvec\1", name.strip(), flags=re.IGNORECASE) for name in names]
     joint = str(keys.get("joint", ""))
-    if joint == "free":  # qpos[0] to qpos[2] are where the origin of the body is
+    # qpos[0] to qpos[2] are where the origin of the body is
+    if joint == "free" and any(name.strip().startswith("qpos") for name in names):
         keys.setdefault("point", ["0", "0", "0"])
     meaning = observed_columns.header(names, joint)
     logs.require_understood(names, meaning.others, [*meaning.places])
@@ -484,6 +485,9 @@ def _observed(document: dict[str, Any], stem: str, case: Case | None, normalize:
         raw = RawStart("gamma", case.start.gamma, case.start.omega)
     else:
         raw = observed_columns.start(document, table, not times[0], said, not body.weight)
+    words = [word for word in observed_columns.unused(said, {*table.values, raw.form}) if word in document]
+    words += ["frame"] if observed_columns.in_space(document) and "omega_space" not in table.values else []
+    notes += (f"ignored keys: {', '.join(words)}",) if words else ()
     precision = _precision(document, table.texts)
     quantities, rows = observed(body, raw, said, table.values, table.places, precision, normalize)
     top, start = quantities.posed.top, quantities.posed.start
@@ -531,6 +535,8 @@ def _about(document: dict[str, Any], stem: str, case: Case | None, broken: bool)
 
 def _body(document: dict[str, Any], case: Case | None) -> AnyBody:
     """The body of a file of a robot, a body with its mass, or a top by its weight."""
+    if "link" in document and "file" not in document:
+        raise InputError("link was given without file.", "Give the file of the link.")
     if "file" in document:
         return body_of({key: document[key] for key in ("file", "link", *BODY) if key in document})
     keys = [key for key in ("mass", "gravity") if key in document]
