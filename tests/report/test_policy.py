@@ -38,6 +38,7 @@ def drift(value: str, band: float | None = None, **changes) -> Row:
         ("[timings]\nratio = inf", "must be at least 1"),
         ("[[rule]]\nmetric = ''", "must be a glob"),
         ("[[rule]]\nmetric = 'drift_[ab'", "must be a glob"),
+        ("[[rule]]\nmetric = 'seconds *'\nlimit = 1", "limit was given for seconds"),
         ("[[rule]]\nlimit = '-1e-9'", "limit must not be negative; got -1e-9"),
         ("loss_bits = '1e400'", "too large"),
         ("floor = ", "not valid"),
@@ -108,6 +109,14 @@ def test_a_rule_that_matches_nothing_is_said(tmp_path: Path) -> None:
             'The rule of the policy with metric = "drft_*" matches nothing.',
             'The rule of the policy with case = "none" matches nothing.',
         ]
+
+
+def test_a_rule_behind_one_that_matches_the_same_is_said(tmp_path: Path) -> None:
+    rules = ("metric = 'drift_*'\nloss_bits = 9", "metric = 'drift_energy*'\nlimit = '1e-15'", "measure = 'drift'")
+    given = policy(tmp_path, "".join(f"[[rule]]\n{rule}\n" for rule in rules))
+    assert compare(report(drift("1e-12")), report(drift("1e-12")), given).sentences[-1] == (
+        'The rule of the policy with metric = "drift_energy*" is not applied: earlier rules match the same metrics.'
+    )
 
 
 def test_changed_flags_are_compared_only_where_the_policy_says_so(tmp_path: Path) -> None:

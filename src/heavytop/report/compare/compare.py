@@ -33,7 +33,7 @@ class Differences:
 
     same: the number of unchanged metrics that are not listed among the findings.  sentences: at most eight about the
     changes, the most telling first, one for each survey with motions that got worse, and one for each rule of the
-    policy that matches nothing.  rows: the changed ones, the worst first.  changed: the findings other than same, the
+    policy that is not applied.  rows: the changed ones, the worst first.  changed: the findings other than same, the
     worst first.  motions: of each survey whose records were joined.
     """
 
@@ -139,7 +139,6 @@ def compare(
     same = rows.same + sum(finding.verdict is Verdict.SAME for finding in findings)
     planned = "seed" in baseline.plan | candidate.plan  # a score has no plan
     joined = [motion for motion in motions if motion is not None]
-    unused = (f"The rule of the policy with {rule.text} matches nothing." for rule in rows.limits.unmatched)
     return Differences(
         findings,
         (_differences({"plan": baseline.plan}, {"plan": candidate.plan}) if planned else [])
@@ -148,7 +147,7 @@ def compare(
         [
             *sentences(changes, same, rows.failed, rows.unsupported),
             *(motion.sentence for motion in joined if motion.sentence),
-            *unused,
+            *rows.limits.remarks,
         ],
         changes.worst_first,
         joined,

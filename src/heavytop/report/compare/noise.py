@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
+from collections.abc import Iterator
 from fnmatch import translate
 from fractions import Fraction
 from functools import lru_cache
@@ -86,6 +87,10 @@ class Rule(Allowance, frozen=True, forbid_unknown_fields=True, kw_only=True):
             glob(pattern)
         if self.limit is not None:
             _not_negative("limit", self.limit)
+        if self.metric.startswith("seconds"):
+            for name in ("limit", "floor", "loss_bits", "loss_digits", "duration", "value"):
+                if getattr(self, name) is not None:
+                    raise InputError(f"{name} was given for seconds.", "Give their ratio and floor in [timings].")
 
     @property
     def text(self) -> str:
@@ -145,12 +150,14 @@ class Limits(msgspec.Struct, frozen=True):
 class Lookup:
     """The limits of each metric of a row under a policy, cached.
 
-    usual: those of metrics without a rule.  unmatched: the rules that match no metric of the rows so far.
+    usual: those of metrics without a rule.  unused: the rules that apply to no metric of the rows so far, by their
+    place.  hidden: the places of those that match some, each of which an earlier rule matches.
     """
 
     def __init__(self, policy: Policy) -> None:
         self.usual = _limits(Rule(), policy)
-        self.unmatched = list(policy.rule)
+        self.unused = dict(enumerate(policy.rule))
+        self.hidden: set[int] = set()
         self._rules = [(_patterns(rule), _limits(rule, policy)) for rule in policy.rule]
         self._known: dict[tuple[str, str, str], Limits] = {}
 
@@ -165,13 +172,25 @@ class Lookup:
         return self._known[key]
 
     def note(self, row: Row) -> None:
-        """Removes the rules that match something in the row from the unmatched ones."""
-        for rule in [*self.unmatched]:
-            measure, case, metric = _patterns(rule)
-            if measure.fullmatch(row.key.kind) and case.fullmatch(row.case):
-                parts = (f"series {name}" for name in row.series), (f"growth {name}" for name in row.laws)
-                if any(map(metric.fullmatch, chain(("", "seconds run"), row.metrics, *parts))):
-                    self.unmatched.remove(rule)
+        """Removes the rules that apply to something in the row from the unused ones."""
+        if not self.unused:
+            return
+        parts = (f"series {name}" for name in row.series), (f"growth {name}" for name in row.laws)
+        for name in chain(("", "seconds run"), row.metrics, *parts):
+            key = row.key.kind, row.case, name
+            matching = [
+                i for i, (patterns, _) in enumerate(self._rules) if all(map(re.Pattern.fullmatch, patterns, key))
+            ]
+            self.hidden.update(matching[1:])
+            if matching:
+                self.unused.pop(matching[0], None)
+
+    @property
+    def remarks(self) -> Iterator[str]:
+        """A sentence on each rule that was not applied."""
+        for place, rule in self.unused.items():
+            why = "is not applied: earlier rules match the same metrics" if place in self.hidden else "matches nothing"
+            yield f"The rule of the policy with {rule.text} {why}."
 
 
 def _patterns(rule: Rule) -> tuple[re.Pattern[str], re.Pattern[str], re.Pattern[str]]:
