@@ -231,6 +231,17 @@ class _Numbers:
                 remedy = f"It has {', '.join(known)}." if known else "It has none."
                 raise InputError(f"{self.where}: unknown {what} {name} of <{element.tag}>.", remedy)
 
+    def require_parts(self, element: Element, known: Sequence[str]) -> None:
+        """Raises InputError for an element within another that is not of the format, or that occurs twice."""
+        self.require_known([part.tag for part in element], element, known, "element")
+        self.require_once(element, *known)
+
+    def require_once(self, element: Element, *tags: str) -> None:
+        """Raises InputError for an element that occurs twice within another."""
+        for tag in tags:
+            if len(element.findall(tag)) > 1:
+                raise InputError(f"{self.where}: <{element.tag}> has several <{tag}>.", "Leave one.")
+
     def attributes(self, element: Element | None, *known: str) -> Mapping[str, str]:
         """Attributes of an element, all of them ``known``; none without the element."""
         if element is None:
@@ -288,7 +299,8 @@ def _within(outer: Pose, inner: Pose) -> Pose:
 def _urdf(name: str, link: Element, inertial: Element, around: _Around) -> BodyInFile:
     numbers = _Numbers(f"link {name}")
     numbers.attributes(inertial)
-    numbers.require_known([part.tag for part in inertial], inertial, ("origin", "mass", "inertia"), "element")
+    numbers.require_once(link, "inertial")
+    numbers.require_parts(inertial, ("origin", "mass", "inertia"))
     tensor = numbers.attributes(inertial.find("inertia"), *_SIX_URDF)
     six, slack = numbers.tensor([tensor.get(key) for key in _SIX_URDF], _SIX_URDF)
     value = numbers.one(numbers.attributes(inertial.find("mass"), "value").get("value"), "mass")
@@ -367,7 +379,8 @@ def _sdf(name: str, link: Element, inertial: Element, around: _Around) -> BodyIn
     numbers, pose, tensor = _Numbers(f"link {name}"), inertial.find("pose"), inertial.find("inertia")
     if inertial.find("fluid_added_mass") is not None:
         raise InputError(f"{numbers.where}: fluid_added_mass is not supported.", "Leave it out.")
-    numbers.require_known([part.tag for part in inertial], inertial, _SDF_INERTIAL, "element")
+    numbers.require_once(link, "inertial", "gravity")
+    numbers.require_parts(inertial, _SDF_INERTIAL)
     if numbers.flag(numbers.attributes(inertial, "auto").get("auto"), "auto"):
         raise InputError(
             f"{numbers.where}: inertial auto is true: Gazebo computes mass and tensor from the shapes.",
@@ -377,7 +390,7 @@ def _sdf(name: str, link: Element, inertial: Element, around: _Around) -> BodyIn
         raise InputError(f"{numbers.where}: an inertial has relative_to {quoted(frame)}.", "Give its pose in the link.")
     axes, centre = _pose(numbers, pose)
     if tensor is not None:
-        numbers.require_known([part.tag for part in tensor], tensor, _SIX_URDF, "element")
+        numbers.require_parts(tensor, _SIX_URDF)
     texts = [None if tensor is None else tensor.findtext(key) for key in _SIX_URDF]
     six, slack = numbers.tensor(texts, _SIX_URDF, products="0")
     mass, frames = numbers.one(inertial.findtext("mass"), "mass"), _SdfFrames(numbers, link, around)
@@ -451,6 +464,8 @@ class _SdfFrames:
         if not self.numbers.flag(self.link.findtext("gravity") or "true", "gravity"):
             return _ZERO
         worlds = [part for part in self.around.values() if part.tag == "world"]
+        if worlds:
+            self.numbers.require_once(worlds[0], "gravity")
         return self.numbers.three(worlds[0].findtext("gravity"), "gravity", "0 0 -9.8") if worlds else EARTH
 
 
@@ -813,8 +828,15 @@ def _toml(path: Path, text: str) -> Iterator[Link]:
             yield name, partial(_toml_table, name, table)
 
 
+_KEYS = ("name", "mass", "gravity", "centre", "inertia", "about")
+_OF_PLANS = ("rotor", "system", "omega", "omega_space", "gamma", "quaternion", "euler", "matrix", "axis_angle")
+"""Further keys of a [[top]], which are of the motion."""
+
+
 def _toml_table(name: str, table: Mapping[str, Any]) -> BodyInFile:
     numbers = _Numbers(f"top {name}")
+    if unknown := sorted(table.keys() - {*_KEYS, *_OF_PLANS}):
+        raise InputError(f"{numbers.where}: unknown key {quoted(unknown[0])}.", f"It has {', '.join(_KEYS)}.")
     texts = _texts(table["inertia"])
     if len(texts) == 9:
         with prefixed(numbers.where):

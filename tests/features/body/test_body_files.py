@@ -555,6 +555,11 @@ REFUSED = {
     "Ixz of SDF": (("sdf", sdf(SIX).replace("ixz>", "Ixz>")), "unknown element Ixz of <inertia>"),
     "degree": (in_sdf('degree="true"'), "unknown attribute degree of <pose>"),
     "Quat": (("xml", mjcf(SIX).replace("pos=", 'Quat="0 1 0 0" pos=')), "unknown attribute Quat of <inertial>"),
+    "center": (("toml", "mass = 1\ncenter = [0, 0, 1]\ninertia = [1, 1, 1]"), "unknown key 'center'"),
+    "weight": (("toml", "mass = 1\nweight = 1\ninertia = [1, 1, 1]"), "unknown key 'weight'"),
+    "two masses": (leg("<origin", '<mass value="3"/><origin'), "<inertial> has several <mass>"),
+    "two inertials of URDF": (leg("</link>", f"{INERTIAL}</link>"), "<link> has several <inertial>"),
+    "two ixx": (("sdf", sdf(SIX).replace("<ixx>", "<ixx>9</ixx><ixx>")), "<inertia> has several <ixx>"),
     # what the format defines and is not read
     "two tensors": (in_mjcf(BALL.replace("/>", ' fullinertia="1 1 1 0 0 0"/>')), "fullinertia and diaginertia"),
     "two inertials": (in_mjcf(BALL + FRAMED), "2 inertials"),
