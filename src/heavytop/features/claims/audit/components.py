@@ -26,6 +26,7 @@ from heavytop.features.claims.algebra.conditions import (
     condition,
     for_no_parameters,
     is_exactly_zero,
+    reduced_everywhere,
     written,
 )
 from heavytop.features.claims.algebra.evaluate import evaluate
@@ -308,13 +309,15 @@ class UserComponent(UserIntegral):
             needs = frozenset(_off_pole(need, u if through else None) for need in _put(needs, put))
             if through is not None:
                 residual = sympy.numer(sympy.together(of_u * through[1] - through[0]))
-                at_samples = _without(base, *STATE) | condition("/", (through[2],))
+                at_samples = _without(base, *STATE) | _nonzero(through[2])
                 needs |= at_samples
                 formulas = Formulas((u,), needs, pole=pole, sampled=at_samples if equation == "reduced" else needs)
                 domain = moved if equation == "reduced" else ALL
                 in_u.append(Statement(equation, index, "smooth", domain, residual, text, formulas))
             elif index == 1 or equation == "rate":
                 residual = sympy.numer(sympy.together(claimed.xreplace({u: q.expression}) * below - above))
+                # sin θ is the root of 1 - γ3² in a formula, and that of γ1² + γ2² in the rate
+                residual = reduced_everywhere(residual, [OFF_SPHERE]) if below.is_Pow else residual
                 flow = Flow(rate, frozenset(STATE), kept, False, (OFF_SPHERE,))
                 needs |= base
                 # a function of time has no kink, and so must be u
@@ -393,7 +396,7 @@ class UserComponent(UserIntegral):
         through = _through(self._u, self.quantity.expression, zeros, _rate_of_angle(name, omega))
         if through is None:
             raise InputError(f"The rate of {name} is not a function of {self._u}.", f"Give {name} by its rate alone.")
-        needs = condition("/", (through[1],)) | condition("/", (through[2],))
+        needs = condition("/", (through[1],)) | _nonzero(through[2])
         return replace(symbol(through[0] / through[1]), needs=needs)
 
     # --- in time ------------------------------------------------------------------------------------------------------
@@ -456,10 +459,17 @@ def _put(needs: frozenset[Need], values: Mapping[sympy.Expr, sympy.Expr]) -> fro
     return frozenset(Need(need.kind, need.expression.xreplace(values)) for need in needs)
 
 
+def _nonzero(divisor: sympy.Expr) -> frozenset[Need]:
+    """The needs that no factor of a divisor is 0."""
+    factors = sympy.Mul.make_args(sympy.factor(sympy.numer(sympy.together(divisor))))
+    return frozenset(need for factor in factors for need in condition("/", (factor.as_base_exp()[0],)))
+
+
 def _off_pole(need: Need, u: sympy.Symbol | None) -> Need:
     """The remaining need where γ is not vertical in the body; u: the symbol of γ3 in it, if any."""
     across = _ACROSS if u is None else 1 - u**2
-    ratio = sympy.cancel(need.expression.subs(_GAMMA[2] ** 2, 1 - _ACROSS) / across)
+    base = need.expression.as_base_exp()[0] if need.kind is ConditionKind.NONZERO else need.expression
+    ratio = sympy.cancel(base.subs(_GAMMA[2] ** 2, 1 - _ACROSS) / across)
     is_constant = not ratio.free_symbols & frozenset((*STATE, u))
     return Need(need.kind, ratio) if is_constant and need.kind is ConditionKind.NONZERO else need
 
