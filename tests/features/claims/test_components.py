@@ -218,6 +218,49 @@ def test_a_pendulum_starts_at_a_zero_of_its_reduced_equation(quantity: str, inte
     assert audited(table | {"assume": assume}).verdict == verdict
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("quantity", ["gamma3", "Omega3"])
+def test_an_equation_is_refuted_without_an_elimination_that_takes_minutes(quantity: str) -> None:
+    """Nothing is a function of one component of Kovalevskaya's top."""
+    table = {
+        "kind": "component",
+        "parameters": {"n": ["1", "3/2"], "w": ["1", "1/2"]},
+        "top": top("2 2 1", "1 0 0", "n"),
+        "start": {"omega": ["0", "w", "2"], "gamma": ["0", "3/5", "4/5"]},
+    }
+    constant = "(Omega1^2 - Omega2^2 - n*gamma1)^2 + (2*Omega1*Omega2 - n*gamma2)^2"
+    component = {"quantity": quantity, "constants": [constant], "reduced": "1 - u^2"}
+    assert audited(table | {"component": component}).verdict == "refuted"
+
+
+@pytest.mark.slow
+def test_the_rate_of_theta_may_be_by_the_root_of_gamma3() -> None:
+    for rate, verdict in (("(gamma2*Omega1 - gamma1*Omega2)/sqrt(1 - u^2)", "holds"), ("Omega1", "refuted")):
+        quadrature = {"variable": "u", "theta": rate}
+        component = {"quantity": "gamma3", "constants": ["Omega3"]}
+        assert audited(LAGRANGE | {"component": component, "quadrature": quadrature}).verdict == verdict
+
+
+@pytest.mark.slow
+def test_an_elimination_names_the_factor_that_must_not_be_0() -> None:
+    """Euler's second component from a state on no axis: the elimination divides by powers of I1 and of I1 - I3."""
+    twice, square = "(I1*p^2 + I2*q^2 + I3*r^2)", "(I1^2*p^2 + I2^2*q^2 + I3^2*r^2)"
+    first, third = f"({square} - I3*{twice} - I2*(I2 - I3)*u^2)", f"(I1*{twice} - {square} - I2*(I1 - I2)*u^2)"
+    table = {
+        "kind": "component",
+        "parameters": {"I1": "3", "I2": "2", "I3": "3/2", "p": "1", "q": "1/3", "r": "2"},
+        "top": top("I1 I2 I3", "0 0 0", "0"),
+        "start": {"omega": ["p", "q", "r"], "gamma": ["0", "0", "1"]},
+        "component": {
+            "quantity": "Omega2",
+            "constants": ["I1^2*Omega1^2 + I2^2*Omega2^2 + I3^2*Omega3^2"],
+            "reduced": f"{first}*{third}/(I1*I3*I2^2)",
+        },
+    }
+    assert set(open_conditions(audited(table)).split("; ")) == {"I1 - I3 ≠ 0 I1 - I3 != 0 is not assumed"}
+    assert audited(table | {"assume": ["I1 != I3"]}).verdict == "holds"
+
+
 EULER_FROM_TWO_AXES = {
     "name": "euler",
     "kind": "component",

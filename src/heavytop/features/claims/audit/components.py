@@ -60,7 +60,7 @@ from heavytop.features.claims.audit.context import (
     three,
 )
 from heavytop.features.claims.audit.judge import Audit, Progress, StatementVerdict, judge, silent, verdict_of
-from heavytop.features.claims.audit.user_claims import OFF_SPHERE, UserIntegral
+from heavytop.features.claims.audit.user_claims import OFF_SPHERE, Rate, UserIntegral
 from heavytop.top.equations import GYROSTAT, System, area, energy, gyrostat_energy
 
 _OMEGA, _GAMMA = STATE[:3], STATE[3:]
@@ -303,8 +303,10 @@ class UserComponent(UserIntegral):
         for equation, index, claimed, above, below, text, needs in claims:
             pole = _POLE if equation == "rate" else ""
             of_u = claimed.xreplace(known)
+            on_motion = sympy.numer(sympy.together(claimed.xreplace({u: q.expression}) * below - above))
             is_of_u = lasting and not of_u.free_symbols & frozenset(STATE)
-            through = _through(u, q.expression, zeros, (above, below)) if is_of_u else None
+            choices = self._eliminations(zeros, (above, below), on_motion, rate) if is_of_u else ()
+            through = _through(u, q.expression, choices, (above, below))
             put = known if through else {u: q.expression}
             needs = frozenset(_off_pole(need, u if through else None) for need in _put(needs, put))
             if through is not None:
@@ -315,9 +317,8 @@ class UserComponent(UserIntegral):
                 domain = moved if equation == "reduced" else ALL
                 in_u.append(Statement(equation, index, "smooth", domain, residual, text, formulas))
             elif index == 1 or equation == "rate":
-                residual = sympy.numer(sympy.together(claimed.xreplace({u: q.expression}) * below - above))
                 # sin θ is the root of 1 - γ3² in a formula, and that of γ1² + γ2² in the rate
-                residual = reduced_everywhere(residual, [OFF_SPHERE]) if below.is_Pow else residual
+                residual = reduced_everywhere(on_motion, [OFF_SPHERE]) if below.is_Pow else on_motion
                 flow = Flow(rate, frozenset(STATE), kept, False, (OFF_SPHERE,))
                 needs |= base
                 # a function of time has no kink, and so must be u
@@ -326,6 +327,29 @@ class UserComponent(UserIntegral):
                 formulas = Formulas((*STATE, *smooth), needs, pole=pole, sampled=sampled)
                 on_state.append(Statement(equation, index, "smooth", _AT_A_STATE, residual, text, formulas, flow))
         return in_u, on_state
+
+    def _eliminations(
+        self, zeros: Sequence[sympy.Expr], parts: Sequence[sympy.Expr], residual: sympy.Expr, rate: Rate
+    ) -> Iterator[list[sympy.Expr]]:
+        """The relations that hold variables of u and the parts alone, then all of them.
+
+        All, where no component of the state is constant, may take minutes: then only where the residual is 0 at the
+        known states, with two derivatives.
+        """
+        variables = {z: z.free_symbols & frozenset(STATE) for z in zeros}
+        constant = set().union(*(x for x in variables.values() if len(x) == 1))
+        near = constant.union(*(e.free_symbols for e in (self.quantity.expression, *parts)))
+        moving = [z for z in zeros if variables[z]]
+        close = [z for z in moving if variables[z] <= near]
+        if len(close) < len(moving):
+            yield close
+        if constant or not set().union(*variables.values()) >= set(STATE):
+            yield moving
+            return
+        first = rate(residual)
+        points, residuals = self.at_states.samples, (residual, first, rate(first))
+        if all(evaluate(e, point, _BITS).contains(0) for e, point in product(residuals, points)):
+            yield moving
 
     def _clock(self, f: sympy.Expr, system: System) -> Iterator[Statement]:
         """F is continuous and F' real and of one sign where u moves: f(u) > 0 there, as are radicands that divide f.
@@ -393,7 +417,9 @@ class UserComponent(UserIntegral):
         """The rate of an angle as a function of u, where the first integrals have their values."""
         omega = tuple(system.angular_velocity(self.context.parameters(system), STATE))
         zeros = [*(part.expression for part in self.where), OFF_SPHERE]
-        through = _through(self._u, self.quantity.expression, zeros, _rate_of_angle(name, omega))
+        parts = _rate_of_angle(name, omega)
+        choices = self._eliminations(zeros, parts, sympy.Integer(0), self._rate(system))
+        through = _through(self._u, self.quantity.expression, choices, parts)
         if through is None:
             raise InputError(f"The rate of {name} is not a function of {self._u}.", f"Give {name} by its rate alone.")
         needs = condition("/", (through[1],)) | _nonzero(through[2])
@@ -480,28 +506,23 @@ def _without(needs: frozenset[Need], *symbols: sympy.Symbol) -> frozenset[Need]:
 
 
 def _through(
-    u: sympy.Symbol, q: sympy.Expr, zeros: Sequence[sympy.Expr], parts: Sequence[sympy.Expr]
+    u: sympy.Symbol, q: sympy.Expr, choices: Iterable[Sequence[sympy.Expr]], parts: Sequence[sympy.Expr]
 ) -> tuple[sympy.Expr, sympy.Expr, sympy.Expr] | None:
-    """Polynomials of the state as functions of u = q where ``zeros`` are 0, and a divisor that must not be 0.
+    """Polynomials of the state as functions of u = q where the zeros of a choice are 0, and a divisor that is not 0.
 
     A Gröbner basis over fractions of the coefficients proposes the functions; they are proven as combinations of the
     zeros.  None where the polynomials are no functions of u.
     """
-    if not all(e.is_polynomial(*STATE) for e in (q, *zeros, *parts)):
-        return None
-    variables = {z: z.free_symbols & frozenset(STATE) for z in zeros}
-    near = set().union(*(e.free_symbols for e in (q, *parts)), *(x for x in variables.values() if len(x) == 1))
-    zeros = [z for z in zeros if variables[z]]
-    close = [z for z in zeros if variables[z] <= near]
-    chosen = (close, zeros) if len(close) < len(zeros) else (zeros,)
-    results = (_through_zeros(u, q, choice, parts) for choice in chosen)
+    results = (_through_zeros(u, q, zeros, parts) for zeros in choices)
     return next((result for result in results if result is not None), None)
 
 
 def _through_zeros(
     u: sympy.Symbol, q: sympy.Expr, zeros: Sequence[sympy.Expr], parts: Sequence[sympy.Expr]
 ) -> tuple[sympy.Expr, sympy.Expr, sympy.Expr] | None:
-    """The result of :func:`_through` with these zeros alone."""
+    """The result of :func:`_through` with these zeros."""
+    if not all(e.is_polynomial(*STATE) for e in (q, *zeros, *parts)):
+        return None
     names: dict[sympy.Expr, sympy.Symbol] = {}
 
     def named(e: sympy.Expr, monic: bool) -> sympy.Expr:
