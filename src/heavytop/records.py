@@ -87,8 +87,11 @@ class Metric(msgspec.Struct, frozen=True, gc=False):
     quantity: Quantity | None = None
 
     def __float__(self) -> float:
-        """The double nearest to :attr:`number`."""
-        return float(self.number)
+        """The double nearest to :attr:`number`; infinity beyond them."""
+        try:
+            return float(self.number)
+        except OverflowError:
+            return math.inf if self.number > 0 else -math.inf
 
     @property
     def number(self) -> Fraction | float:

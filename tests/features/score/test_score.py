@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 import os
 import re
 import sys
@@ -284,6 +285,14 @@ def test_a_state_too_large_for_its_format_is_not_finite(precision: str, size: st
     assert (row.outcome, row.samples) == ("non_finite", 1)
     given["states"][1] = ["1e308", *given["states"][1][1:]]
     assert measured(read(written(tmp_path, given))).row.outcome == "success"
+
+
+def test_an_error_beyond_double_is_scored() -> None:
+    given, case = document(), LAGRANGE
+    given["states"][1] = [*given["states"][1][:5], "1e400"]
+    score = ht.score(TIMES, given["states"], top=case.top, start=case.start, precision=QUAD)
+    assert float(score.row.metric("solution_error", "gamma", "max")) == math.inf
+    assert score.digits_kept == 0
 
 
 def test_what_has_no_end_is_refused_before_it_is_read(tmp_path: Path) -> None:
