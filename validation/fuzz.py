@@ -28,6 +28,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
+from copy import deepcopy
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -136,7 +137,7 @@ def structure(random_: random.Random, document: object) -> object:
         elif how < 0.4 and isinstance(inner, str):
             parent[key] = bytes_of(random_, inner.encode()).decode(errors="replace")
         else:
-            parent[key] = random_.choice(ODD_JSON)
+            parent[key] = deepcopy(random_.choice(ODD_JSON))
     return copy
 
 
