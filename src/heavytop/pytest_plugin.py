@@ -84,6 +84,10 @@ def gate(
         trajectory = ht.propagate(
             known.top, known.start, requested_times, precision, integrator=trajectory, system=known.system, **options
         )
+    elif options:
+        raise InputError(f"{next(iter(options))} was given with states.", "Leave it out, or give an integrator.")
+    elif times is not None and isinstance(trajectory, ht.Trajectory):
+        raise InputError("times were given with a Trajectory.", "Leave them out: it has its own.")
     name = "given"
     if isinstance(trajectory, ht.Trajectory):
         if trajectory.outcome is not ht.Outcome.SUCCESS:

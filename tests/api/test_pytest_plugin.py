@@ -57,6 +57,18 @@ def test_states_are_scored_with_their_times_and_not_without() -> None:
         gate(run.states, "euler")
 
 
+def test_arguments_that_states_do_not_need_are_refused() -> None:
+    known = case("euler")
+    run = ht.propagate(known.top, known.start, [1, 2])
+    for states, times, unused in (
+        (run, None, {"tolerance": "1e-9"}),
+        (run.states, [1, 2], {"step": 1}),
+        (run, [3], {}),
+    ):
+        with pytest.raises(ht.InputError, match="given with"):
+            gate(states, "euler", times=times, **unused)
+
+
 def test_states_that_are_not_finite_have_no_digits() -> None:
     known = case("euler")
     states = ht.propagate(known.top, known.start, [1, 2, 3]).to_numpy()
