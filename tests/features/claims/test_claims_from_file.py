@@ -148,6 +148,8 @@ WRONG_KEYS = [
     ({"id": "An id"}, "id must be lower-case words joined by hyphens"),
     ({"name": ""}, "name must be text of length >= 1"),
     ({"start": {"gamma": ["0", "0", "1"]}}, r"a claim of kind 'integral' does not use gamma of \[start\]"),
+    ({"domain": "t>0"}, "a claim of kind .integral. does not use domain"),
+    ({"times": ["1"]}, "a claim of kind .integral. does not use times"),
 ]
 
 
