@@ -301,39 +301,6 @@ def test_the_command_line_takes_a_body_from_a_file(arm: Path) -> None:
         assert words in done.stderr
 
 
-RIGHT_AS_WRITTEN: dict[str, tuple[str, bytes]] = {
-    "a default namespace": ("urdf", urdf(SIX).replace("<robot ", '<robot xmlns="http://www.ros.org" ').encode()),
-    "a mark of UTF-8": ("urdf", b"\xef\xbb\xbf" + urdf(SIX).encode()),
-    "UTF-16": ("urdf", ('<?xml version="1.0" encoding="utf-16"?>' + urdf(SIX)).encode("utf-16")),
-    "Latin-1": ("urdf", ('<?xml version="1.0" encoding="latin-1"?><!-- \xe9 -->' + urdf(SIX)).encode("latin-1")),
-    "lines of Windows": ("sdf", b"\r\n" + sdf(SIX).replace("><", ">\r\n<").encode()),
-    "an included file": (
-        "xml",
-        mjcf(SIX).replace("mujoco>", "mujocoinclude>").replace("<worldbody>", "").replace("</worldbody>", "").encode(),
-    ),
-}
-
-
-@pytest.mark.parametrize("name", RIGHT_AS_WRITTEN)
-def test_a_right_file_is_read_however_it_is_written(name: str, tmp_path: Path) -> None:
-    suffix, content = RIGHT_AS_WRITTEN[name]
-    (path := tmp_path / f"arm.{suffix}").write_bytes(content)
-    assert read_body(path).six == tuple(map(Fraction, SIX))
-
-
-@pytest.mark.parametrize(
-    "frame",
-    ['euler="90 0 0"', 'axisangle="2 0 0 90"', 'xyaxes="3 0 0 5 0 2"', 'zaxis="0 -7 0"', 'quat="1 1 0 0"'],
-)
-def test_every_frame_of_mjcf_is_read(frame: str, tmp_path: Path) -> None:
-    """A quarter of a turn about x exchanges the second and the third moment."""
-    (path := tmp_path / "arm.xml").write_text(
-        '<mujoco><worldbody><body><geom type="mesh" mesh="m"/>'
-        f'<inertial pos="0 0 0" mass="1" diaginertia="2 3 4" {frame}/></body></worldbody></mujoco>'
-    )
-    assert [round(float(value), 15) for value in read_body(path).six] == [2, 4, 3, 0, 0, 0]
-
-
 def test_shapes_of_mjcf_are_those_of_their_default_class(tmp_path: Path) -> None:
     """The tensor of a box turned the other way, whose size and type are those of a class within another."""
     assert first_slip(
@@ -344,36 +311,10 @@ def test_shapes_of_mjcf_are_those_of_their_default_class(tmp_path: Path) -> None
     ) == (1, "conjugate_axes")
 
 
-def test_angles_of_mjcf_are_of_its_sequence_and_a_ball_joint_of_its_class(tmp_path: Path) -> None:
-    """Principal moments 3, 2, 1.5 turned by 90 degrees about z, then about the turned y; and about the fixed y."""
-    path = tmp_path / "arm.xml"
-    inertial = '<inertial pos="0 0 0" mass="1" diaginertia="3 2 1.5" euler="90 90 0"/>'
-    for sequence, moments in (("zyx", (2, Fraction(3, 2), 3)), ("ZYX", (Fraction(3, 2), 3, 2))):
-        path.write_text(
-            f'<mujoco><compiler eulerseq="{sequence}"/><default><default class="b"><joint type="ball"/></default>'
-            f'</default><worldbody><body childclass="b"><joint pos="0 0 -1"/>{inertial}</body></worldbody></mujoco>'
-        )
-        found = read_body(path)
-        assert found.six[:3] == moments
-        assert found.joint == (0, 0, -1)
-
-
 INERTIAL = (
     '<inertial><origin xyz="0.1 0 0.2"/><mass value="2"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0.1" iyz="0"/>'
     "</inertial>"
 )
-
-
-def test_a_product_that_sdf_leaves_out_is_0(tmp_path: Path) -> None:
-    (path := tmp_path / "a.sdf").write_text(sdf(SIX).replace("<ixz>-0.02</ixz>", ""))
-    assert read_body(path).six == (*map(Fraction, SIX[:4]), 0, Fraction(SIX[5]))
-
-
-def test_attributes_of_the_schema_and_of_namespaces_are_read(tmp_path: Path) -> None:
-    path = tmp_path / "a.urdf"
-    turned = urdf(SIX).replace('rpy="0 0 0"', 'quat_xyzw="0 0 1 0" x:note="1"').replace("<robot", '<robot xmlns:x="x"')
-    path.write_text(turned)
-    assert read_body(path).six[3:] == (Fraction("0.05"), Fraction("0.02"), Fraction("-0.04"))
 
 
 def test_corrected_mass_and_centre_are_printed_and_nothing_is_null(tmp_path: Path) -> None:
@@ -461,8 +402,42 @@ def in_sdf(
     return "sdf", LINK.format(form=form, angles=angles, joint=joint, before=around[0], after=around[1], exempt=exempt)
 
 
-# As MuJoCo 4.0.0 and Drake 1.56 read them: centre of mass from the pivot, mass, I11 I22 I33, gravity.
-READ = {
+def principal(moments: str, frame: str, before: str = "", joint: str = "") -> tuple[str, str]:
+    """1 kg in MJCF with these moments about the axes of a frame."""
+    return in_mjcf(f'{joint}<inertial pos="0 0 0" mass="1" diaginertia="{moments}" {frame}/>', before)
+
+
+def of_class(sequence: str) -> tuple[str, str]:
+    """Angles in this sequence, and the ball joint of a default class."""
+    before = f'<compiler eulerseq="{sequence}"/><default><default class="b"><joint type="ball"/></default></default>'
+    return principal("3 2 1.5", 'euler="90 90 0"', before, '<joint class="b" pos="0 0 -1"/>')
+
+
+BEGIN = "0.1 0 0.2 2.5 0.31 0.28 0.19 9.81"
+ARM = f"{BEGIN} 0.05 -0.02 0.04"
+INCLUDED = mjcf(SIX).replace("mujoco>", "mujocoinclude>").replace("<worldbody>", "").replace("</worldbody>", "")
+ENCODED = '<?xml version="1.0" encoding="{}"?><!-- \xe9 -->' + urdf(SIX)
+TURNED = urdf(SIX).replace('rpy="0 0 0"', 'quat_xyzw="0 0 1 0" x:note="1"').replace("<robot", '<robot xmlns:x="x"')
+QUARTER = "0 0 0 1 2 4 3 9.81"
+# As MuJoCo 4.0.0 and Drake 1.56 read them: centre of mass from the pivot, mass, I11 I22 I33, gravity, and products.
+READ: dict[str, tuple[tuple[str, str | bytes], str]] = {
+    "a default namespace": (("urdf", urdf(SIX).replace("<robot ", '<robot xmlns="http://www.ros.org" ')), ARM),
+    "a mark of UTF-8": (("urdf", b"\xef\xbb\xbf" + urdf(SIX).encode()), ARM),
+    "UTF-16": (("urdf", ENCODED.format("utf-16").encode("utf-16")), ARM),
+    "Latin-1": (("urdf", ENCODED.format("latin-1").encode("latin-1")), ARM),
+    "lines of Windows": (("sdf", b"\r\n" + sdf(SIX).replace("><", ">\r\n<").encode()), ARM),
+    "an included file": (("xml", INCLUDED), ARM),
+    "a product that SDF leaves out": (("sdf", sdf(SIX).replace("<ixz>-0.02</ixz>", "")), f"{BEGIN} 0.05 0 0.04"),
+    "attributes of the schema and of namespaces": (("urdf", TURNED), f"{BEGIN} 0.05 0.02 -0.04"),
+    # a quarter of a turn about x exchanges the second and the third moment
+    "euler": (principal("2 3 4", 'euler="90 0 0"'), QUARTER),
+    "axisangle": (principal("2 3 4", 'axisangle="2 0 0 90"'), QUARTER),
+    "xyaxes": (principal("2 3 4", 'xyaxes="3 0 0 5 0 2"'), QUARTER),
+    "zaxis": (principal("2 3 4", 'zaxis="0 -7 0"'), QUARTER),
+    "quat": (principal("2 3 4", 'quat="1 1 0 0"'), QUARTER),
+    # by 90 degrees about z, then about the turned y; and about the fixed y
+    "angles about turned axes": (of_class("zyx"), "0 0 1 1 2 1.5 3 9.81"),
+    "angles about fixed axes": (of_class("ZYX"), "0 0 1 1 1.5 3 2 9.81"),
     "bounds": (in_mjcf(BALL, '<compiler boundmass="5" boundinertia=".045"/>'), "0.1 0 0.2 5 0.045 0.05 0.045 9.81"),
     "balanced": (
         in_mjcf(BALL.replace("0.04", "0.1"), '<compiler balanceinertia="true"/>'),
@@ -490,14 +465,16 @@ READ = {
 
 
 @pytest.mark.parametrize("name", READ)
-def test_frames_joints_bounds_and_gravity_are_those_of_the_format(tmp_path: Path, name: str) -> None:
+def test_a_file_is_read_exactly_as_its_format_defines(tmp_path: Path, name: str) -> None:
     (suffix, text), numbers = READ[name]
-    (path := tmp_path / f"a.{suffix}").write_text(text)
-    body, expected = read_body(path), [Fraction(number) for number in numbers.split()]
+    (path := tmp_path / f"a.{suffix}").write_bytes(text if isinstance(text, bytes) else text.encode())
+    *expected, gravity = map(Fraction, numbers.split()[:8])
+    products = numbers.split()[8:] or [0] * 3
+    body = read_body(path)
     given = body.about(None)
-    assert [*given.centre, given.mass, *given.six[:3], body.gravity_down] == expected
-    assert ht.Body.from_file(path).gravity == expected[-1]
-    assert f'gravity = "{numbers.split()[-1]}"' in heavytop("body", path).stdout
+    assert [*given.centre, given.mass, *given.six, body.gravity_down] == [*expected, *map(Fraction, products), gravity]
+    assert ht.Body.from_file(path).gravity == gravity
+    assert f'gravity = "{numbers.split()[7]}"' in heavytop("body", path).stdout
     assert ht.Body.from_file(path, gravity=3).gravity == 3
 
 
