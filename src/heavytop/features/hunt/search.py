@@ -6,16 +6,14 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache, partial
+from functools import partial
 from itertools import product
-from math import gcd
 from pathlib import Path
 from statistics import median, quantiles
 from time import process_time
 from typing import Any
 
 import msgspec
-import numpy
 from flint import arb
 
 from heavytop.cases import Case
@@ -55,8 +53,7 @@ Shows = Callable[[Sequence[Motion]], list[bool]]
 """Whether each of the motions shows the fault."""
 _MOST_ROUNDS = 12
 _TOGETHER = 8
-_DIRECTION_NORMS = (1, 2, 3, 5, 7, 9, 11, 13, 15, 17, 25, 33, 51, 65, 99, 201, 301, 451, 651, 901, 999)
-_MOST_DENOMINATOR = 31
+_DENOMINATORS = range(1, 28)
 _EXACT = 61
 """Characters of a fraction of two numbers below 2^100."""
 
@@ -135,70 +132,41 @@ def _simpler_starts(motion: Motion) -> Iterator[Motion]:
     yield top, State((0, 0, 0), start.gamma)
 
 
-def _simpler_moments(motion: Motion) -> Iterator[Motion]:
-    """Bodies with a simpler number for one moment, or for two equal ones."""
+def _simpler_data(places: Sequence[int], motion: Motion) -> Iterator[Motion]:
+    """Motions with a simpler number in one of these places of (I, P, r, Ω, rotor), or for two moments at once."""
     top, start = motion
-    for i, value in enumerate(top.inertia):
-        for simple in _simpler_numbers(value):
-            if simple > 0:
-                for indices in ((i,), (i, (i + 1) % 3), (i, (i + 2) % 3)):
-                    inertia = [simple if k in indices else moment for k, moment in enumerate(top.inertia)]
-                    if 2 * max(inertia) <= sum(inertia):
-                        yield with_data(top, inertia, top.weight, top.centre), start
+    numbers = [*top.inertia, top.weight, *top.centre, *start.omega, *(top.rotor or ())]
+    for place in (place for place in places if place < len(numbers)):
+        groups = [(place, (place + k) % 3) for k in range(3)] if place < 3 else [(place,)]
+        for simple, group in product(_simpler_numbers(numbers[place]), groups):
+            changed = [simple if k in group else value for k, value in enumerate(numbers)]
+            inertia, omega = changed[:3], changed[7:10]
+            if min(inertia) > 0 and 2 * max(inertia) <= sum(inertia):
+                yield HeavyTop(inertia, changed[3], changed[4:7], changed[10:] or None), State(omega, start.gamma)
 
 
-def _simpler_datum(index: int, motion: Motion) -> Iterator[Motion]:
-    """Motions with a simpler weight, or component of the centre or of Ω."""
-    top, start = motion
-    numbers = [top.weight, *top.centre, *start.omega]
-    for simple in _simpler_numbers(numbers[index]):
-        weight, *vectors = _replaced(numbers, index, simple)
-        yield with_data(top, top.inertia, weight, vectors[:3]), State(vectors[3:], start.gamma)
-
-
-def _replaced(values: Sequence[Fraction], index: int, value: Fraction) -> list[Fraction]:
-    return [*values[:index], value, *values[index + 1 :]]
-
-
-def _simpler_rotors(motion: Motion) -> Iterator[Motion]:
-    """Bodies whose rotor is 0, or simpler in one component."""
+def _without_rotor(motion: Motion) -> Iterator[Motion]:
+    """The body with a rotor at rest."""
     top, start = motion
     if top.rotor is not None:
         yield with_data(top, rotor_times=0), start
-        for index, value in enumerate(top.rotor):
-            for simple in _simpler_numbers(value):
-                yield HeavyTop(top.inertia, top.weight, top.centre, _replaced(top.rotor, index, simple)), start
 
 
 def _near_directions(motion: Motion) -> Iterator[Motion]:
-    """Starts with the nearest rational γ up to each of some denominators."""
+    """Starts with γ at rational points of the unit sphere, each nearer than all of smaller denominators."""
     top, start = motion
-    table = _directions()
-    norms = table[:, 0]
-    distances = numpy.abs(table[:, 1:] / table[:, :1] - numpy.array(start.gamma, float)).max(axis=1)
-    nearest = (int(distances[: int((norms <= most).sum())].argmin()) for most in _DIRECTION_NORMS)
-    for row in dict.fromkeys(nearest):
-        norm, *parts = table[row].tolist()
-        yield top, State(start.omega, [Fraction(part, norm) for part in parts])
-
-
-@cache
-def _directions() -> Any:
-    """Rational unit vectors with numbers of at most three digits: integers, shape (n, 4), by their denominators.
-
-    Each row has the common denominator and three numerators.
-    """
-    directions: dict[tuple[int, int, int, int], None] = {}
-    for n in range(1, _MOST_DENOMINATOR + 1):
-        for a, b in product(range(-n, n + 1), repeat=2):
-            norm = n * n + a * a + b * b
-            if a * a + b * b <= n * n and norm < 1000:
-                u, v, w = 2 * a * n, 2 * b * n, n * n - a * a - b * b
-                common = gcd(u, v, w, norm)
-                u, v, w, norm = u // common, v // common, w // common, norm // common
-                for part in (w, -w):
-                    directions |= dict.fromkeys([(norm, u, v, part), (norm, v, part, u), (norm, part, u, v)])
-    return numpy.array(sorted(directions, key=lambda entry: entry[0]))
+    points: dict[tuple[Fraction, ...], int] = {}
+    for n, axis in product(_DENOMINATORS, range(3)):  # stereographic, from the poles of each axis
+        w, u, v = start.gamma[axis:] + start.gamma[:axis]
+        a, b = (round(n * part / (1 + abs(w))) for part in (u, v))
+        norm = n * n + a * a + b * b
+        near = [Fraction(part, norm) for part in ((2 * n * n - norm) * (1 if w > 0 else -1), 2 * a * n, 2 * b * n)]
+        points[*near[3 - axis :], *near[: 3 - axis]] = max(part.denominator for part in near)
+    nearest = Fraction(2)
+    for gamma in sorted(points, key=points.__getitem__):
+        if (distance := max(abs(a - b) for a, b in zip(gamma, start.gamma, strict=True))) < nearest:
+            nearest = distance
+            yield top, State(start.omega, gamma)
 
 
 def _simpler_numbers(value: Fraction) -> list[Fraction]:
@@ -219,9 +187,10 @@ _CHANGES: tuple[Callable[[Motion], Iterator[Motion]], ...] = (
     _simpler_starts,
     _other_units,
     _near_directions,
-    _simpler_moments,
-    *(partial(_simpler_datum, index) for index in range(7)),
-    _simpler_rotors,
+    partial(_simpler_data, range(3)),
+    *(partial(_simpler_data, [place]) for place in range(3, 10)),
+    _without_rotor,
+    partial(_simpler_data, range(10, 13)),
 )
 
 
