@@ -13,6 +13,7 @@ import heavytop as ht
 from heavytop.errors import InputError
 from heavytop.features.score.trajectories.bags import of_bag, storage
 from heavytop.features.score.trajectories.columns import header
+from heavytop.features.score.trajectories.files import read
 from support.in_process import heavytop, printed
 
 BODY = ht.Body("2", "9.81", ("0.3", "-0.2", "0.4"), ("1.2", "0.9", "0.6"), "centre of mass")
@@ -244,6 +245,20 @@ def test_every_form_of_one_motion_is_right(name: str, tmp_path: Path) -> None:
     assert digits(tmp_path / f"log.{suffix}", text()) > (6 if name.startswith("TUM") else 13)
 
 
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("ATTITUDE_DIR = A2C", "ATTITUDE_DIR must be A2B or B2A; got 'A2C'"),
+        ("ATTITUDE_DIR = A2B\nATTITUDE_DIR = B2A", "The key ATTITUDE_DIR occurs twice"),
+        ("ATTITUDE_DIRECTION = B2A", "Unknown key 'ATTITUDE_DIRECTION'.*Did you mean ATTITUDE_DIR?"),
+    ],
+)
+def test_a_key_of_an_ephemeris_that_is_not_understood_is_refused(line: str, said: str, tmp_path: Path) -> None:
+    (file := tmp_path / "log.aem").write_text(ephemeris().replace("ATTITUDE_DIR = A2B", line))
+    with pytest.raises(InputError, match=f"(?s){said}"):
+        read(file)
+
+
 def test_arrays_of_numpy_are_a_table(tmp_path: Path) -> None:
     path = tmp_path / "log.npz"
     comments = {"mass": "2", "gravity": "9.81", "about": "centre of mass"}
@@ -253,6 +268,7 @@ def test_arrays_of_numpy_are_a_table(tmp_path: Path) -> None:
     for arrays in (
         {"t": TIMES, "quaternions": quaternions(), **comments, **texts},
         {"t": TIMES, "q": scalar_last(), "quaternion_order": "xyzw", **comments, **texts},
+        {"t": TIMES, "quaternions": scalar_last(), "quaternion_order": "scalar last", **comments, **texts},
         {"time": TIMES, "R": run().matrices(), **whole},
     ):
         numpy.savez(path, **arrays)

@@ -16,7 +16,13 @@ from heavytop import written_numbers
 from heavytop.display import plural
 from heavytop.errors import InputError, prefixed, quoted, require_as_many
 from heavytop.exact.flint.balls import midpoint, working_precision
-from heavytop.features.score.trajectories.logs import canonical, of_rodrigues, of_rotation_vector, with_quaternion
+from heavytop.features.score.trajectories.logs import (
+    ORDERS,
+    canonical,
+    of_rodrigues,
+    of_rotation_vector,
+    with_quaternion,
+)
 from heavytop.features.score.trajectories.observed import RawStart
 from heavytop.measure.attitude_error import FRAMES, WIDTHS, Convention
 from heavytop.precision import Vector, dot, exact, log10, vector
@@ -354,10 +360,6 @@ _ARRAYS = {
 """Keys of JSON documents whose values are a list for each time."""
 KEYS = {*CONVENTIONS, *STARTS, *BODIES, *_ARRAYS}
 _REMEDY = "`heavytop docs score` describes the file formats."
-_ORDERS = {
-    **dict.fromkeys(("wxyz", "scalar first", "scalar_first"), "wxyz"),
-    **dict.fromkeys(("xyzw", "scalar last", "scalar_last"), "xyzw"),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -382,9 +384,9 @@ def convention(document: Mapping[str, Any], header: Header | None = None) -> Con
     """Conventions that the file states; raises InputError for what is not known."""
     stated: dict[str, Any] = {}
     if (order := _word(document, "quaternion_order")) is not None:
-        if order.lower() not in _ORDERS:
+        if order.lower() not in ORDERS:
             raise InputError(f"quaternion_order must be wxyz or xyzw; got {quoted(order)}.", "Give one of these.")
-        stated["quaternion_order"] = _ORDERS[order.lower()]
+        stated["quaternion_order"] = ORDERS[order.lower()]
     for key in ("quaternion", "matrix"):
         if _is_direction(document.get(key)):
             stated[key] = document[key].strip()

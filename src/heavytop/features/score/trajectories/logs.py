@@ -17,7 +17,7 @@ from typing import Any
 
 from flint import arb, fmpq
 
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, nearest, quoted, refusal
 from heavytop.exact.flint.balls import midpoint, working_precision
 from heavytop.extras import require_extra
 from heavytop.precision import decimal_text
@@ -320,6 +320,10 @@ def without_preamble(text: str) -> str:
 
 
 _KINDS = ("QUATERNION", "QUATERNION/RATE", "QUATERNION/ANGVEL")
+_VALUES = {"QUATERNION_TYPE": ("FIRST", "LAST"), "ATTITUDE_DIR": ("A2B", "B2A")}
+_USED = ("ATTITUDE_TYPE", "REF_FRAME_A", "REF_FRAME_B", "RATE_FRAME", "ANGVEL_FRAME", "TIME_SYSTEM", *_VALUES)
+_LIKE = 0.8
+"""Similarity from which a key is a misspelling of one that is used."""
 _SPACECRAFT = re.compile(r"SC_|SPACECRAFT|.*BODY|ACTUATOR|INSTRUMENT|CSS|DSS|GYRO|IMU|STARTRACKER", re.IGNORECASE)
 """Frames of a message that turn with the spacecraft."""
 
@@ -336,7 +340,14 @@ def of_ephemeris(text: str) -> str:
     """
     if text.count("META_START") != 1:
         raise InputError(f"The message must have one segment; got {text.count('META_START')}.", "Give one segment.")
-    meta = dict(re.findall(r"^\s*([A-Z_]+)\s*=\s*(.*?)\s*$", text, re.MULTILINE))
+    meta: dict[str, str] = {}
+    for key, value in re.findall(r"^\s*([A-Z_]+)\s*=\s*(.*?)\s*$", text, re.MULTILINE):
+        if key not in _USED and (near := nearest(key, _USED, _LIKE)):
+            raise InputError(f"Unknown key {quoted(key)}.", f"Did you mean {near}?")
+        if meta.setdefault(key, value) != value:
+            raise InputError(f"The key {key} occurs twice.", "Give each key once.")
+        if value.upper() not in (known := _VALUES.get(key, (value.upper(),))):
+            raise refusal(key, " or ".join(known), quoted(value), "Give one of these.")
     kind = meta.get("ATTITUDE_TYPE", "").upper()
     if kind not in _KINDS:
         raise InputError(f"ATTITUDE_TYPE = {quoted(kind)} is not supported.", f"Use one of {', '.join(_KINDS)}.")
@@ -382,6 +393,13 @@ def _epoch(text: str, system: str = "UTC") -> Fraction:
     raise InputError(f"{quoted(text)} is not an epoch.", "Write it as 2026-01-31T12:00:00.5.")
 
 
+ORDERS = {
+    **dict.fromkeys(("wxyz", "scalar first", "scalar_first"), "wxyz"),
+    **dict.fromkeys(("xyzw", "scalar last", "scalar_last"), "xyzw"),
+}
+"""Words for the order of quaternions."""
+
+
 def of_arrays(content: bytes, suffix: str) -> str:
     """A .npy of seven columns or of named ones, a .npz of arrays by their names, or a Parquet table, as CSV.
 
@@ -393,7 +411,7 @@ def of_arrays(content: bytes, suffix: str) -> str:
     columns = _of_parquet(content) if suffix == ".parquet" else _of_numpy(content)
     lengths = {canonical(name).partition(" ")[0]: len(array) for name, array in columns.items() if array.ndim}
     count = next((lengths[name] for name in _TIMES if name in lengths), max(lengths.values(), default=0))
-    last = str(columns.get("quaternion_order", "")) == "xyzw"
+    last = ORDERS.get(str(columns.get("quaternion_order", "")).strip().lower()) == "xyzw"
     names: list[str] = []
     parts: list[Any] = []
     comments = []
