@@ -1,11 +1,11 @@
 """Policies: rules by pattern, first match counts, and what is wrong with one is said."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from heavytop.errors import InputError
-from heavytop.precision import exact
 from heavytop.records import Law, Row
 from heavytop.report.compare.noise import Policy, adjusted, load
 from support.reports import compare, replace
@@ -214,56 +214,50 @@ def test_exponents_differ_where_their_intervals_do_not_meet_and_a_lost_law_is_mi
     assert found(drift("1e-12"), grows(0.9, 1.0)) == "new"
 
 
+EVALUATION = "claim_evaluation_error"
+
+
+def measured(measure: str, name: str, value: str, kind: str = "error", band: float | None = None, **more: Any) -> Row:
+    needed = {f"{EVALUATION}_{q}_max_finite": error("0") for q in ("omega", "theta", "psi")}
+    metrics = needed | {name: replace(error(value), kind=kind, band=band)}
+    return row(measure=measure, metrics=metrics, **more)
+
+
+SLOPE = {"kind": "value", "band": 0.01}
+MANY, PEER = {"steps": 10_000}, {"integrator": "peer:A tolerance=1e-9"}
+
+
 @pytest.mark.parametrize(
-    ("measure", "name", "value"),
+    ("measure", "name", "old", "more", "expected"),
     [
-        ("local_error", "local_error_ulp_max", "0.4"),
-        ("local_error", "local_error_ulp_rms", "0.2"),
-        ("claim_evaluation", "claim_evaluation_error_omega_max_finite", "2e-8"),
-        ("score", "solution_error_gamma_max", "1e-13"),
-        ("score", "drift_energy_max", "1e-14"),
-        ("work_precision", "error_max", "1e-10"),
-        ("work_precision", "drift_energy_max", "1e-12"),
+        # two bits and no more, without a band
+        ("local_error", "local_error_ulp_max", "0.4", {}, "worse 2, same 1.2 0.134, better 0.08"),
+        ("local_error", "local_error_ulp_rms", "0.2", {}, "worse 1, same 0.6 0.067, better 0.04"),
+        ("claim_evaluation", f"{EVALUATION}_omega_max_finite", "2e-8", {}, "worse 1e-7, same 6e-8 6.7e-9, better 4e-9"),
+        ("score", "solution_error_gamma_max", "1e-13", {}, "worse 5e-13, same 3e-13 3.4e-14, better 2e-14"),
+        ("score", "drift_energy_max", "1e-14", {}, "worse 5e-14, same 3e-14 3.4e-15, better 2e-15"),
+        ("work_precision", "error_max", "1e-10", {}, "worse 5e-10, same 3e-10 3.4e-11, better 2e-11"),
+        ("work_precision", "drift_energy_max", "1e-12", {}, "worse 5e-12, same 3e-12 3.4e-13, better 2e-13"),
+        # what roundings add up to: eps = 2.2e-16, 4 n eps = 8.9e-12, 4 √n eps = 8.9e-14
+        ("work_precision", "error_max", "1e-13", MANY, "same 8e-12, worse 4e-11"),
+        ("work_precision", "drift_area_max", "1e-15", MANY, "same 8e-14, worse 4e-13"),
+        ("drift", "error_max", "1e-13", MANY, "worse 8e-12"),
+        # a decade of an integrator of others
+        ("work_precision", "error_max", "1e-9", PEER, "same 1e-8, worse 2e-8, better 5e-11"),
+        # a millionth of a model of a claim, whichever way it went; a value with a band
+        ("claim_model", "claim_model_error_omega_max", "0.25", {"kind": "value"}, "same 0.250000025, worse 1.25 0.05"),
+        ("break_away_law", "break_away_slope", "1", SLOPE, "same 1.06, worse 1.08"),
     ],
 )
-def test_rows_without_a_band_may_lose_two_bits_and_no_more(measure: str, name: str, value: str) -> None:
-    def one(factor: str) -> Row:
-        needed = {f"claim_evaluation_error_{q}_max_finite": error("0") for q in ("omega", "theta", "psi")}
-        return row(measure=measure, metrics=needed | {name: error(str(exact(value) * exact(factor)))})
-
-    for factor, verdict in (("5", "worse"), ("3", "same"), ("1/3", "same"), ("1/5", "better")):
-        assert verdicts(one("1"), one(factor), Policy())[name] == verdict, factor
-
-
-def test_work_against_precision_is_the_same_below_what_its_roundings_add_up_to() -> None:
-    # eps = 2.2e-16: 4 n eps = 8.9e-12, 4 √n eps = 8.9e-14
-    for name, measure, old, new, verdict in (
-        ("error_max", "work_precision", "1e-13", "8e-12", "same"),
-        ("error_max", "work_precision", "1e-13", "4e-11", "worse"),
-        ("drift_area_max", "work_precision", "1e-15", "8e-14", "same"),
-        ("drift_area_max", "work_precision", "1e-15", "4e-13", "worse"),
-        ("error_max", "drift", "1e-13", "8e-12", "worse"),
-    ):
-        two = [row(measure=measure, steps=10_000, metrics={name: error(value)}) for value in (old, new)]
-        assert judged(*two)[0] == verdict, (name, new)
-
-
-def test_an_integrator_of_others_may_move_by_a_decade() -> None:
-    def run(value: str) -> Row:
-        return row(measure="work_precision", integrator="peer:A tolerance=1e-9", metrics={"error_max": error(value)})
-
-    for value, verdict in (("1e-8", "same"), ("2e-8", "worse"), ("5e-11", "better")):
-        assert verdicts(run("1e-9"), run(value), Policy()) == {"error_max": verdict}
-    assert verdicts(run("1e-9"), run("5e-9"), Policy(noise=0)) == {"error_max": "worse"}
-
-
-def test_a_model_of_a_claim_agrees_to_a_millionth_whichever_way_it_went() -> None:
-    def off(factor: str) -> Row:
-        value = replace(error(str(exact("0.25") * exact(factor))), kind="value")
-        return row(measure="claim_model", metrics={"claim_model_error_omega_max": value})
-
-    for factor, verdict in (("1.0000001", "same"), ("5", "worse"), ("1/5", "worse")):
-        assert verdicts(off("1"), off(factor))["claim_model_error_omega_max"] == verdict
+def test_each_measurement_has_an_allowance_of_its_own(
+    measure: str, name: str, old: str, more: dict[str, Any], expected: str
+) -> None:
+    before = measured(measure, name, old, **more)
+    for verdict, *values in (part.split() for part in expected.split(", ")):
+        found = [verdicts(before, measured(measure, name, value, **more))[name] for value in values]
+        assert found == [verdict] * len(values), values
+    if more is PEER:
+        assert verdicts(before, measured(measure, name, "5e-9", **more), noise=0)[name] == "worse"
 
 
 @pytest.mark.parametrize(
@@ -294,15 +288,6 @@ def test_options_count_before_the_policy() -> None:
     assert verdicts(drift("1e-17"), drift("3e-17"), given)["drift_energy_max"] == "worse"
     with pytest.raises(InputError, match="negative"):
         adjusted(Policy(), loss_bits="-2")
-
-
-def test_a_value_with_a_band_agrees_within_it() -> None:
-    def slope(value: str) -> Row:
-        metric = replace(error(value), kind="value", band=0.01)
-        return row(metrics={"break_away_slope": metric}, measure="break_away_law")
-
-    assert verdicts(slope("1"), slope("1.06"))["break_away_slope"] == "same"
-    assert verdicts(slope("1"), slope("1.08"))["break_away_slope"] == "worse"
 
 
 def test_a_row_is_ignored_as_a_whole_by_a_rule_for_all_its_metrics(tmp_path: Path) -> None:
