@@ -140,16 +140,6 @@ def test_an_unknown_option_is_refused_as_python_refuses_it() -> None:
         ht.ensemble([TOP], START, [1], xi=None)
 
 
-def test_a_finder_that_returns_no_motion_is_refused() -> None:
-    with pytest.raises(ht.InputError, match="what finder returns must be an exact solution; got None"):
-        ht.reference(TOP, START, [1], finder=lambda *_: None)  # type: ignore[arg-type,return-value]
-
-
-def test_xi_without_attitude_is_refused() -> None:
-    with pytest.raises(ht.InputError, match="xi was given with attitude=False"):
-        ht.propagate(TOP, START, [1], xi=(0, 1, 0), attitude=False)
-
-
 @pytest.mark.slow
 @pytest.mark.usefixtures("undiagnosed")
 @pytest.mark.filterwarnings("ignore")
@@ -241,6 +231,8 @@ MASKED = np.ma.masked_equal([0.1, 0.4, 0.9, 0.6, 0.0, 0.8], 0.4)
         (lambda: ht.propagate(TOP, START, [1], xi=(1, 0)), "xi must have 3 numbers; got 2"),
         (lambda: ht.propagate(TOP, START, [1], xi=(0, 2, 0)), "|xi|^2 - 1 = 3"),
         (lambda: ht.propagate(TOP, START, [1], xi=(1, 0, 0)), "xi·gamma = 0.6"),
+        (lambda: ht.propagate(TOP, START, [1], xi=(0, 1, 0), attitude=False), "xi was given with attitude=False"),
+        (lambda: ht.reference(TOP, START, [1], finder=lambda *_: None), "must be an exact solution; got None"),
         (lambda: ht.propagate(TOP, START, [1], step_limit=-1), "step_limit must be at least 1; got -1"),
         (lambda: ht.propagate(TOP, START, [1], observer=3), "observer must be callable; got 3"),
         (lambda: ht.propagate(TOP, START, [1], integrator="splitting:4", step_limit=3), "does not support step_limit"),
