@@ -56,7 +56,7 @@ def gate(
     case: str = "lagrange",
     *,
     times: Sequence[Any] | None = None,
-    precision: str = "double",
+    precision: str | None = None,
     **options: Any,
 ) -> Gated:
     """The digits right of an integrator on a built-in case, or of states computed by any program.
@@ -66,7 +66,7 @@ def gate(
             states of shape (n, 6) in the order Ω1 Ω2 Ω3 γ1 γ2 γ3 at ``times``.
         case: a name of `heavytop list`.
         times: exact numbers, strictly monotone away from 0; None for 1, 2, ..., 10; required with states.
-        precision: the format.
+        precision: the format; None for that of a Trajectory, else double.
         options: of :func:`heavytop.propagate`, such as ``tolerance``.
 
     Raises:
@@ -80,16 +80,18 @@ def gate(
     known = case_named(case)
     trajectory = integrator_or_states
     if isinstance(trajectory, str) or (callable(trajectory) and not isinstance(trajectory, ht.Trajectory)):
-        requested_times = list(range(1, 11)) if times is None else times
-        trajectory = ht.propagate(
-            known.top, known.start, requested_times, precision, integrator=trajectory, system=known.system, **options
-        )
+        requested = list(range(1, 11)) if times is None else times, precision or "double"
+        system = known.system
+        trajectory = ht.propagate(known.top, known.start, *requested, integrator=trajectory, system=system, **options)
     elif options:
         raise InputError(f"{next(iter(options))} was given with states.", "Leave it out, or give an integrator.")
     elif times is not None and isinstance(trajectory, ht.Trajectory):
         raise InputError("times were given with a Trajectory.", "Leave them out: it has its own.")
-    name = "given"
+    elif precision is not None and isinstance(trajectory, ht.Trajectory):
+        raise InputError("precision was given with a Trajectory.", "Leave it out: it has its own.")
+    name, form = "given", precision or "double"
     if isinstance(trajectory, ht.Trajectory):
+        form = trajectory.problem.precision.name
         if trajectory.outcome is not ht.Outcome.SUCCESS:
             pytest.fail(f"{case}: {trajectory!r}", pytrace=False)
         times, trajectory, name = trajectory.times, trajectory.states, trajectory.integrator
@@ -101,7 +103,7 @@ def gate(
             trajectory,
             top=known.top,
             start=known.start,
-            precision=precision,
+            precision=form,
             system=known.system,
             name=case,
             integrator=name,

@@ -69,6 +69,14 @@ def test_arguments_that_states_do_not_need_are_refused() -> None:
             gate(states, "euler", times=times, **unused)
 
 
+def test_a_trajectory_is_scored_in_its_own_format() -> None:
+    lagrange = case("lagrange")
+    run = ht.propagate(lagrange.top, lagrange.start, [1, 2], "quad")
+    assert gate(run).digits_right > 30
+    with pytest.raises(InputError, match="precision was given with a Trajectory"):
+        gate(run, precision="double")
+
+
 def test_states_that_are_not_finite_have_no_digits() -> None:
     known = case("euler")
     states = ht.propagate(known.top, known.start, [1, 2, 3]).to_numpy()
