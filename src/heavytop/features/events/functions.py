@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import ast
 from collections import Counter
-from collections.abc import Callable, Sequence, Sized
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cache, reduce
+from operator import mul
 from typing import Any, NamedTuple
 
 import msgspec
@@ -135,19 +137,11 @@ class Ratio:
 
     __hash__ = object.__hash__
 
-    def __abs__(self) -> Any:
-        raise NotRational("an absolute value")
-
-    def __float__(self) -> float:
-        raise NotRational("a conversion")
-
-    __lt__ = __le__ = __gt__ = __ge__ = __eq__
-
     @property
     def constant(self) -> Fraction:
         """The value of a constant ratio."""
-        part = [(part.to_dict() or {(0,) * 6: fmpq(0)})[(0,) * 6] for part in (self.numerator, self.denominator)]
-        return Fraction(int(part[0].p), int(part[0].q)) / Fraction(int(part[1].p), int(part[1].q))
+        value = self.numerator.coefficient(0) / self.denominator.coefficient(0) if self.numerator else fmpq(0)
+        return Fraction(int(value.p), int(value.q))
 
     def reduced(self) -> Ratio:
         """The ratio without a common factor."""
@@ -308,24 +302,15 @@ def terms_of(polynomial: Any) -> list[tuple[tuple[int, ...], fmpq]]:
 
 def composed(terms: Sequence[tuple[tuple[int, ...], Any]], components: Sequence[Any], zero: Any) -> Any:
     """The polynomial with these terms at six elements of any ring, of which those that do not occur may be None."""
-    powers: dict[tuple[int, int], Any] = {}
 
+    @cache
     def power(index: int, count: int) -> Any:
-        if count == 1:
-            return components[index]
-        key = index, count
-        if key not in powers:
-            powers[key] = power(index, count // 2) * power(index, count - count // 2)
-        return powers[key]
+        return components[index] if count == 1 else power(index, count // 2) * power(index, count - count // 2)
 
     total = zero
     for exponents, coefficient in terms:
-        product: Any = None
-        for index, count in enumerate(exponents):
-            if count:
-                factor = power(index, count)
-                product = factor if product is None else product * factor
-        total = total + (coefficient if product is None else product * coefficient)
+        factors = [power(index, count) for index, count in enumerate(exponents) if count]
+        total = total + (reduce(mul, factors) * coefficient if factors else coefficient)
     return total
 
 
@@ -472,7 +457,7 @@ class Events(Tabular):
 
     def _table(self) -> TitledTable:
         title = (
-            f"{_counted(self)} {self.function} in {self.problem.precision.name} by {self.integrator}, "
+            f"{plural(len(self), 'event')} {self.function} in {self.problem.precision.name} by {self.integrator}, "
             f"t = 0 to {six_digits(self.until)}"
         )
         notes = [_EXPLAINED[self.guarantee], *filter(None, [self.discontinuity_text()])]
@@ -528,7 +513,7 @@ class ReferenceEvents(Tabular, msgspec.Struct, frozen=True):
     def _table(self) -> TitledTable:
         worst = max((Fraction(ball.radius) for ball in self.times), default=Fraction(0))
         until = six_digits(exact(self.until))
-        title = f"{_counted(self)} {self.function}, known to {self.digits} digits, t = 0 to {until}"
+        title = f"{plural(len(self), 'event')} {self.function}, known to {self.digits} digits, t = 0 to {until}"
         radius = f"largest radius of a time {radius_text(worst)}; " if self.times else ""
         notes = [_EXPLAINED[PROVEN], f"{radius}{self.method}"]
         return _listed(self, title, self.digits, lambda ball: exact(ball.value), notes)
@@ -598,7 +583,3 @@ def arrays(times: Sequence[Any], states: Sequence[Any], directions: Sequence[int
         numpy.array(states) if len(states) else numpy.empty((0, 6)),
         numpy.array(directions, dtype=numpy.int64),
     )
-
-
-def _counted(events: Sized) -> str:
-    return f"{len(events)} event{'s' * (len(events) != 1)}"
