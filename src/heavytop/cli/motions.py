@@ -11,7 +11,7 @@ from inspect import Parameter, Signature, signature
 from itertools import combinations
 from operator import or_
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Protocol, get_args, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Protocol, TypeAlias, get_args, get_type_hints
 
 import typer
 
@@ -121,6 +121,9 @@ _SHARED = _WHICH | _WHERE
 """The options that `propagate` and `reference` share: motion and outputs."""
 
 
+Measurement: TypeAlias = "tuple[Callable[[], dict[str, Any]], Callable[[], RenderableType]]"
+
+
 class MotionOptions(Protocol):
     """Options of a further measurement of a motion by a feature; a NamedTuple of options of typer."""
 
@@ -129,8 +132,8 @@ class MotionOptions(Protocol):
     def require(self) -> str:
         """The name of the measurement for the progress bar; "" for none.  Raises InputError for invalid options."""
 
-    def measure(self, top: Any, start: Any, until: Any, **settings: Any) -> Any:
-        """A measurement with ``to_json()``, entries of the document of the motion, and ``text()``, printed after it."""
+    def measure(self, top: Any, start: Any, until: Any, **settings: Any) -> Measurement:
+        """A measurement: functions that return entries of the document of the motion, and the text printed after it."""
 
 
 _FURTHER: list[Any] = [feature.load(feature.motion) for feature in FEATURES if feature.motion]
@@ -151,7 +154,7 @@ class _Request:
         self.times = numbers(times)
         self.further = [(option, what) for option in further if (what := option.require())]
 
-    def beside(self, expected: float, **settings: Any) -> list[Any]:
+    def beside(self, expected: float, **settings: Any) -> list[Measurement]:
         """The measurements of features on the motion, up to the time farthest from 0.
 
         expected: seconds.  settings: of :meth:`MotionOptions.measure`.
@@ -168,7 +171,7 @@ class _Request:
         document: Callable[[], dict[str, Any]],
         make_table: Callable[[], MotionTable],
         text: Callable[[MotionTable], RenderableType],
-        beside: Sequence[Any],
+        beside: Sequence[Measurement],
     ) -> None:
         """Write the requested files, and one document on standard output: JSON, CSV, LaTeX or the table, followed by
         the further measurements.
@@ -190,12 +193,12 @@ class _Request:
                 say(f"wrote {path}")
         if self.json:
             command, version = made_by()
-            complete = reduce(or_, (extra.to_json() for extra in beside), document())
+            complete = reduce(or_, (entries() for entries, _ in beside), document())
             print_json({**complete, "command": command, "version": version})
         elif on_screen is not None:
             print(on_screen, end="")
         elif table is not None:
-            for extra in (text(table), *(extra.text() for extra in beside)):
+            for extra in (text(table), *(shown() for _, shown in beside)):
                 show_on_terminal(extra)
 
 

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from functools import partial
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
 from heavytop.errors import InputError
-
-if TYPE_CHECKING:
-    from rich.console import RenderableType
 
 Functions = Annotated[
     list[str] | None,
@@ -43,26 +40,16 @@ class EventOptions(NamedTuple):
             event_function(text)
         return "events" if self.events else ""
 
-    def measure(self, top: Any, start: Any, until: Any, **settings: Any) -> MotionEvents:
+    def measure(self, top: Any, start: Any, until: Any, **settings: Any) -> Any:
         """The events of each function.  settings: of :func:`heavytop.events`."""
         from heavytop.features.events.api import events
-
-        functions, direction = self.events or (), self.event_direction
-        return MotionEvents([events(top, start, until, function, direction, **settings) for function in functions])
-
-
-@dataclass(frozen=True, slots=True)
-class MotionEvents:
-    """The events of each function, on a motion that is shown with them."""
-
-    events: list[Any]
-
-    def to_json(self) -> dict[str, Any]:
-        """Entries of the document of the motion."""
-        return {"events": [event.to_json() if hasattr(event, "to_json") else event for event in self.events]}
-
-    def text(self) -> RenderableType:
-        """A table for each event."""
+        from heavytop.features.events.functions import Events
         from heavytop.features.events.text import events_text
 
-        return events_text(self.events)
+        functions, direction = self.events or (), self.event_direction
+        known = [events(top, start, until, function, direction, **settings) for function in functions]
+
+        def entries() -> dict[str, Any]:
+            return {"events": [each.to_json() if isinstance(each, Events) else each for each in known]}
+
+        return entries, partial(events_text, known)

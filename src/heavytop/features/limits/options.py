@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
 from heavytop.errors import InputError
-
-if TYPE_CHECKING:
-    from rich.console import RenderableType
 
 Ends = Annotated[
     bool,
@@ -41,33 +37,21 @@ class LimitOptions(NamedTuple):
             raise InputError("--within was given without --between.", "Give --between DT too.")
         return "limits" if self.digits_end or self.between is not None else ""
 
-    def measure(self, top: Any, start: Any, until: Any, **settings: Any) -> MotionLimits:
+    def measure(self, top: Any, start: Any, until: Any, **settings: Any) -> Any:
         """The measurements that the options request."""
+        from rich.text import Text
+
         from heavytop.features.limits.between import between_samples
         from heavytop.features.limits.digits_end import digits_end
 
         system = settings.get("system")
-        documents: dict[str, Any] = {}
+        measured: dict[str, Any] = {}
         if self.digits_end:
             form = settings.get("precision", "double")
-            documents["digits_end"] = digits_end(top, start, until, form, system=system)
+            measured["digits_end"] = digits_end(top, start, until, form, system=system)
         if self.between is not None:
-            documents["between"] = between_samples(top, start, until, self.between, self.within, system=system)
-        return MotionLimits(documents)
-
-
-@dataclass(frozen=True, slots=True)
-class MotionLimits:
-    """Measurements, by the keys of the document."""
-
-    measured: dict[str, Any]
-
-    def to_json(self) -> dict[str, Any]:
-        """Entries of the document of the motion."""
-        return {name: value.to_json() for name, value in self.measured.items()}
-
-    def text(self) -> RenderableType:
-        """A table for each."""
-        from rich.text import Text
-
-        return Text("\n" + "\n\n".join(str(value) for value in self.measured.values()))
+            measured["between"] = between_samples(top, start, until, self.between, self.within, system=system)
+        return (
+            lambda: {name: value.to_json() for name, value in measured.items()},
+            lambda: Text("\n" + "\n\n".join(map(str, measured.values()))),
+        )
