@@ -223,16 +223,11 @@ def poincare(
         )
     if not listed:
         raise InputError("No starts were given.", "Give at least one State.")
+    how: dict[str, Any] = {"precision": precision, "integrator": integrator} if digits is None else {"digits": digits}
     sections: list[Events | ReferenceEvents] = []
     for index, start in enumerate(listed):
         with prefixed(f"Start {index}"):
-            sections.append(
-                events(
-                    top, start, until, function, direction, precision, integrator=integrator, system=system, limit=limit
-                )
-                if digits is None
-                else events(top, start, until, function, direction, digits=digits, system=system, limit=limit)
-            )
+            sections.append(events(top, start, until, function, direction, system=system, limit=limit, **how))
     about = arguments.system(system, top)
     own = [resolve(top, start) for start in listed]
     parameters = [about.parameters(setup.top, setup.start) for setup in own]

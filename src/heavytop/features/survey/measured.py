@@ -228,23 +228,20 @@ def _one_by_one(
     if integrator.ensemble:
         many = integrator.propagate_many(problems, times, threads=1, **options)
         return [(run.outcome.value, run.states, run.steps) for run in many]
-    runs = [_alone(integrator, problem, times, options) for problem in problems]
-    failures = [run for run in runs if isinstance(run, PeerFailed)]
+    runs: list[tuple[str, Sequence[Any], int]] = []
+    failures = []
+    for problem in problems:
+        try:
+            (run,) = integrator.propagate_many([problem], times, threads=1, **options)
+        except PeerFailed as error:
+            failures.append(error)
+            runs.append((Outcome.FAILED.value, (), 0))
+            continue
+        short = run.outcome is Outcome.SUCCESS and len(run.states) < len(times)
+        runs.append(((Outcome.INCOMPLETE if short else run.outcome).value, run.states, run.steps))
     if len(failures) == len(runs):
         raise failures[0]
-    return [(Outcome.FAILED.value, (), 0) if isinstance(run, PeerFailed) else run for run in runs]
-
-
-def _alone(
-    integrator: Integrator, problem: Problem, times: Sequence[Fraction], options: dict[str, Any]
-) -> tuple[str, Sequence[Any], int] | PeerFailed:
-    """Outcome, states and steps; PeerFailed, not raised, where the integrator failed."""
-    try:
-        (run,) = integrator.propagate_many([problem], times, threads=1, **options)
-    except PeerFailed as error:
-        return error
-    short = run.outcome is Outcome.SUCCESS and len(run.states) < len(times)
-    return (Outcome.INCOMPLETE if short else run.outcome).value, run.states, run.steps
+    return runs
 
 
 def _pairs(states: Sequence[Sequence[Any]], samples: int) -> Pairs:
