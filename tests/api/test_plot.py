@@ -186,6 +186,7 @@ def test_what_has_no_picture_is_refused(run, known) -> None:
     for draw, match in (
         (lambda: ht.plot.sphere(short), "no attitude"),
         (lambda: ht.plot.sphere(known, of="centre"), "its top"),
+        (lambda: ht.plot.sphere(known, top=FREE), "top is another than that of the reference"),
         (lambda: ht.plot.sphere(run, of="nose"), "got 'nose'"),
         (lambda: ht.plot.sphere(ht.propagate(FREE, TUMBLING, TIMES), of="centre"), "fixed point"),
         (lambda: ht.plot.phase(run, "gamma4"), "not a component"),

@@ -150,11 +150,15 @@ def principal(run: Motion, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def parameters_of(run: Motion, top: HeavyTop | None) -> Parameters:
-    """I, P r and the rotor of a motion, in principal axes; raises InputError for a known one without ``top``."""
+    """I, P r and the rotor of a motion, in principal axes; raises InputError for a known one without its ``top``."""
     if isinstance(run, Trajectory):
         return run.problem.parameters
     if not isinstance(top, HeavyTop):
         raise InputError("A reference does not contain its top.", "Give top=.")
+    if run.mass is None and run.inertia and run.weight and run.centre:
+        own = (*run.inertia, run.weight, *run.centre, *(run.rotor or ()))
+        if [*map(exact, own)] != [*top.inertia, top.weight, *top.centre, *(top.rotor or ())]:
+            raise InputError("top is another than that of the reference.", "Give the one of heavytop.reference.")
     return Parameters(top.inertia, top.moment, top.rotor or 0)
 
 
