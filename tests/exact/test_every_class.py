@@ -13,6 +13,7 @@ from support.proofs import (
     assert_enclosed,
     assert_every_digit,
     assert_exact,
+    assert_narrow,
     assert_overlap,
     attitude_of,
 )
@@ -75,6 +76,12 @@ FAMILIES = {
 def test_a_random_motion_solves_all_six_equations(name: str, seed: int) -> None:
     family = FAMILIES[name]
     assert_exact(family.motion(seed), seed, family.attitude)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FAMILIES)
+def test_a_thousand_digits_come_out_far_out(name: str) -> None:
+    assert_narrow(FAMILIES[name].motion(3), Fraction(10**6), 1000)
 
 
 @pytest.mark.slow

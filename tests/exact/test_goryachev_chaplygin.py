@@ -48,11 +48,6 @@ STARTS = {
 }
 
 
-@pytest.mark.slow
-def test_a_thousand_digits_come_out():
-    assert_narrow(motion_from(ALONG_1, ("3/4", "1/2", 0), UP), F(10**6), 1000)
-
-
 @pytest.mark.parametrize("power", [11, 20, 40, 120])
 def test_levels_too_near_to_one_that_is_not_done_are_left_to_the_enclosure(power):
     step, top = F(1, 10**power), HeavyTop((4, 4, 1), 1, (1, 0, 0))

@@ -12,7 +12,7 @@ from heavytop.exact.cases.kovalevskaya_theta import ORDERS, KovalevskayaLevel, T
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import Undecided, ball, midpoint, series_length, working_precision
 from heavytop.top.heavy_top import HeavyTop, State
-from support.proofs import assert_narrow, assert_overlap, assert_solves, positive, rational, triple
+from support.proofs import assert_overlap, assert_solves, positive, rational, triple
 
 F = Fraction
 UP = (F(0), F(0), F(1))
@@ -157,11 +157,6 @@ def test_the_exponent_of_an_asymptotic_motion_is_that_of_its_enclosure():
     assert (logarithms[0] - logarithms[1]) / 32 == pytest.approx(exponent, rel=0.1)
     with pytest.raises(NotInClass, match="not asymptotic"):
         random_motion(1).exponent(60)
-
-
-@pytest.mark.slow
-def test_hundreds_of_digits_come_out():
-    assert_narrow(motion_from((F(3, 5), F(1, 3)), (F(1, 3), F(4, 5), F(-7, 10)), TILTED), F(10**6), 400)
 
 
 def test_a_factor_is_told_only_where_one_alone_is_possible():
