@@ -13,7 +13,7 @@ from heavytop.exact.cases.delone import Delone, DeloneHomoclinic
 from heavytop.exact.cases.dokshevich import Dokshevich
 from heavytop.exact.cases.ershkov_partial import ErshkovPartial
 from heavytop.exact.cases.euler import Euler
-from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplygin
+from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplygin, Sretensky
 from heavytop.exact.cases.goryachev_chaplygin_rest import GoryachevChaplyginRest
 from heavytop.exact.cases.grioli import Grioli
 from heavytop.exact.cases.gyrostat import Gyrostat
@@ -58,6 +58,9 @@ SAMPLES = {
     ),
     Hess: Hess(HeavyTop((6, 4, 3), "1/2", (2, 0, 2)), State(("3/5", "4/5", "-6/5"), UNIT)),
     Delone: Delone(HeavyTop((2, 2, 1), 1, ("3/5", 0, 0)), State(("3/5", 0, 1), ("3/5", 0, "4/5"))),
+    Sretensky: Sretensky(
+        HeavyTop((4, 4, 1), 1, (1, 0, 0), (0, 0, 1)), State(("1/2", "1/3", "-5/2"), ("3/5", 0, "4/5"))
+    ),
 }
 
 
@@ -71,7 +74,7 @@ def kind(solution):
 def test_every_class_is_found_under_every_naming_of_the_axes(case, axes):
     sample = SAMPLES[case]
     top, start = renamed_top(sample.top, axes), renamed_state(sample.start, axes)
-    found = find(top, start)
+    found = find(top, start, sample.system)
     assert kind(found) is case
     assert (found.top, found.start) == (top, start)
     assert_solves(found, F(7, 3))
@@ -170,7 +173,7 @@ def test_data_of_any_length_are_refused_in_words():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", SAMPLES, ids=lambda case: case.__name__)
+@pytest.mark.parametrize("case", [case for case in SAMPLES if case is not Sretensky], ids=lambda case: case.__name__)
 def test_a_rotor_without_momentum_leaves_the_closed_forms_of_the_heavy_top(case):
     motion = SAMPLES[case]
     data = motion.top.inertia, motion.top.weight, motion.top.centre

@@ -33,7 +33,7 @@ GYROSTATS = {
     "general": (HeavyTop((4, 2, 1), 1, (0, 1, 0)), State(("1/6", "-1/6", "2/3"), ("2/3", "-1/3", "2/3"))),
     "permanent": (HeavyTop((3, 2, 1), 1, (0, 1, 0)), State((0, 1, 0), (0, 1, 0))),
 }
-MOTIONS = [(case.__name__, sample.top, sample.start, HEAVY_TOP) for case, sample in SAMPLES.items()]
+MOTIONS = [(case.__name__, sample.top, sample.start, sample.system) for case, sample in SAMPLES.items()]
 MOTIONS += [("generic", *GENERIC, HEAVY_TOP)]
 MOTIONS += [(name, top, start, GYROSTAT) for name, (top, start) in GYROSTATS.items()]
 HEAVY_GYROSTATS = {

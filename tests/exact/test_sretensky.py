@@ -6,10 +6,8 @@ from fractions import Fraction
 import pytest
 from flint import fmpq_mpoly_ctx
 
-from heavytop import HEAVY_GYROSTAT, HeavyTop, State
+from heavytop import HeavyTop, State
 from heavytop.exact.cases.goryachev_chaplygin import Sretensky
-from heavytop.exact.catalogue import find
-from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
 from heavytop.exact.separable.abel import Rest
 from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
 
@@ -57,14 +55,6 @@ def test_the_separation_is_proven_by_polynomials():
 @pytest.mark.parametrize("seed", [4, 5])
 def test_the_attitude_turns_with_the_body_at_any_time(seed):
     assert_attitude(random_motion(seed), F(-(10**4)))
-
-
-@pytest.mark.parametrize("axes", ALL)
-def test_it_is_found_under_every_naming_of_the_axes(axes):
-    motion = random_motion(3)
-    found = find(renamed_top(motion.top, axes), renamed_state(motion.start, axes), HEAVY_GYROSTAT)
-    assert isinstance(getattr(found, "solution", found), Sretensky)
-    assert_solves(found, F(7, 3))
 
 
 ALONG_1 = (F(1), F(0))
