@@ -41,7 +41,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, lru_cache
 from math import exp, inf, isfinite, lcm, log2
-from typing import NamedTuple, TypeAlias, TypeVar
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from flint import arb, fmpz, fmpz_poly
@@ -59,7 +59,6 @@ from heavytop.multiword.problem import variation as variation_of
 
 
 Matrix = NDArray[np.float64]
-Place = TypeVar("Place", int, tuple[int, int])
 Field = Callable[[tuple[mpq, ...]], Sequence[mpq]]
 
 
@@ -90,49 +89,39 @@ class Quadratic:
 
 def quadratic(field: Field, dimension: int) -> Quadratic:
     """The coefficients of ``field``, which must be of degree two without a constant part."""
-    unit = [tuple(mpq(int(i == j)) for i in range(dimension)) for j in range(dimension)]
-    plus = [field(e) for e in unit]
-    minus = [field(tuple(-x for x in e)) for e in unit]
-    table: list[dict[tuple[int, int], Fraction]] = [{} for _ in range(dimension)]
-    lines: list[dict[int, Fraction]] = [{} for _ in range(dimension)]
-    for j in range(dimension):
-        for i in range(dimension):
-            _keep(table[i], (j, j), (plus[j][i] + minus[j][i]) / 2)
-            _keep(lines[i], j, (plus[j][i] - minus[j][i]) / 2)
+    size = range(dimension)
+    unit = [tuple(mpq(int(i == j)) for i in size) for j in size]
+    plus, minus = [field(e) for e in unit], [field(tuple(-x for x in e)) for e in unit]
+    squares = [[(x + y) / 2 for x, y in zip(*pair, strict=True)] for pair in zip(plus, minus, strict=True)]
+    lines = [[(x - y) / 2 for x, y in zip(*pair, strict=True)] for pair in zip(plus, minus, strict=True)]
+    terms = {}
+    for j in size:
+        terms[j, j] = squares[j]
         for k in range(j + 1, dimension):
             of_sum = field(tuple(x + y for x, y in zip(unit[j], unit[k], strict=True)))
-            for i in range(dimension):
-                _keep(table[i], (j, k), of_sum[i] - plus[j][i] - plus[k][i])
-    return _assemble(table, lines)
-
-
-def _keep(row: dict[Place, Fraction], key: Place, value: mpq) -> None:
-    if value:
-        row[key] = Fraction(int(value.numerator), int(value.denominator))
-
-
-def _assemble(table: list[dict[tuple[int, int], Fraction]], lines: list[dict[int, Fraction]]) -> Quadratic:
-    dimension = len(lines)
-    pairs = tuple(sorted({pair for row in table for pair in row}))
-    rows = []
+            terms[j, k] = [value - x - y for value, x, y in zip(of_sum, plus[j], plus[k], strict=True)]
+    pairs = tuple(pair for pair, values in terms.items() if any(values))
+    rows, sums = [], []
     jacobian, slope = np.zeros((dimension,) * 3), np.zeros((dimension,) * 2)
-    for i, (products, linear) in enumerate(zip(table, lines, strict=True)):
+    for i in size:
+        products = {index: _fraction(terms[pair][i]) for index, pair in enumerate(pairs) if terms[pair][i]}
+        linear = {j: _fraction(lines[j][i]) for j in size if lines[j][i]}
         common = lcm(*(c.denominator for c in (*products.values(), *linear.values())))
-        rows.append(
-            QuadraticComponent(
-                common,
-                tuple((int(c * common), pairs.index(pair)) for pair, c in products.items()),
-                tuple((int(c * common), j) for j, c in linear.items()),
-            )
-        )
-        for (j, k), c in products.items():
+        numbered = (tuple((int(c * common), place) for place, c in of.items()) for of in (products, linear))
+        rows.append(QuadraticComponent(common, *numbered))
+        sums.append([sum(map(abs, of.values()), Fraction(0)) for of in (products, linear)])
+        for index, c in products.items():
+            j, k = pairs[index]
             jacobian[i, j, k] += _rounded(c)
             jacobian[i, k, j] += _rounded(c)
         for j, c in linear.items():
             slope[i, j] = _rounded(c)
-    q = max(sum((abs(c) for c in row.values()), Fraction(0)) for row in table)
-    l = max(sum((abs(c) for c in row.values()), Fraction(0)) for row in lines)  # noqa: E741
+    q, l = map(max, zip(*sums, strict=True))  # noqa: E741
     return Quadratic(pairs, tuple(rows), q, l, jacobian, slope)
+
+
+def _fraction(value: mpq) -> Fraction:
+    return Fraction(int(value.numerator), int(value.denominator))
 
 
 def _rounded(value: Fraction) -> float:
