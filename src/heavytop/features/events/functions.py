@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 
 from heavytop.display import Lazy, Tabular, TitledTable, plural
 from heavytop.errors import InputError, quoted
-from heavytop.exact.flint.balls import radius_text, rational
+from heavytop.exact.closed_form import taylor
+from heavytop.exact.flint.balls import coefficient, radius_text, rational, series_length, whole_evaluation
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.reference import Ball, rounded_up
 from heavytop.precision import Array, decimal_text, exact, native_text, six_digits
@@ -308,9 +309,9 @@ def composed(terms: Sequence[tuple[tuple[int, ...], Any]], components: Sequence[
         return components[index] if count == 1 else power(index, count // 2) * power(index, count - count // 2)
 
     total = zero
-    for exponents, coefficient in terms:
+    for exponents, times in terms:
         factors = [power(index, count) for index, count in enumerate(exponents) if count]
-        total = total + (reduce(mul, factors) * coefficient if factors else coefficient)
+        total = total + (reduce(mul, factors) * times if factors else times)
     return total
 
 
@@ -324,6 +325,7 @@ def rate_along(polynomial: Any, system: System, parameters: Parameters) -> Any:
     return total
 
 
+@whole_evaluation
 def start_series(
     polynomials: Sequence[Any],
     system: System,
@@ -332,9 +334,6 @@ def start_series(
     terms: int = _TERMS,
 ) -> list[list[Fraction]]:
     """The Taylor coefficients of polynomials along the motion from an exact start, in powers of t, exactly."""
-    from heavytop.exact.closed_form import taylor
-    from heavytop.exact.flint.balls import coefficient, series_length
-
     rows = taylor(system.field, parameters, start, terms)
     with series_length(terms):
         series = [fmpq_series([rational(v) for v in row], prec=terms) for row in rows]
@@ -352,24 +351,14 @@ def first_term(
     Raises InputError where the function is zero along the motion as far as its series is followed, or what it is
     divided by is.
     """
-    from heavytop.exact.flint.balls import whole_evaluation
-
     parts = function.numerator, function.square, function.denominator
-    terms = _TERMS
-
-    @whole_evaluation
-    def first() -> list[tuple[int, Fraction] | None]:
+    # a component leaves its value at the start as t, t^2 or, rarely, a little later
+    for terms in (_TERMS, _TERMS + 4 * max(part.total_degree() for part in parts)):
         series = start_series(parts, system, parameters, start, terms)
-        return [next(((n, value) for n, value in enumerate(row) if value), None) for row in series]
-
-    numerator, square, denominator = first()
-    if None in (numerator, square, denominator):
-        # a component leaves its value at the start as t, t^2 or, rarely, a little later
-        terms += 4 * max(part.total_degree() for part in parts)
-        numerator, square, denominator = first()
-    if numerator is not None and square is not None and denominator is not None:
-        return numerator
-    fault = "is divided by 0" if denominator is None else "is zero"
+        leading = [next(((n, value) for n, value in enumerate(row) if value), None) for row in series]
+        if all(leading) and leading[0]:
+            return leading[0]
+    fault = "is divided by 0" if leading[2] is None else "is zero"
     raise InputError(
         f"The function {quoted(function.name)} {fault} along this motion: the first {terms} terms of its series at "
         "t = 0 vanish.",
