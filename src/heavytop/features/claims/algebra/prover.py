@@ -376,6 +376,7 @@ class Prover:
         self._conditions: dict[object, tuple[Condition, ...]] = {}
         self._sample_points: dict[tuple[str, str], list[Point]] = {}
         self._met: dict[object, bool] = {}
+        self._causes: dict[sympy.Expr, str] = {}
 
     # --- fields -----------------------------------------------------------------------------------------------------
 
@@ -411,8 +412,10 @@ class Prover:
             expressions |= dict.fromkeys(need.expression for need in _sorted(f.needs | f.angle_needs))
             kept |= {e for e in (*f.values, *(need.expression for need in f.needs)) if _is_kept(e, statement)}
         for chosen in (expressions, [e for e in expressions if e not in kept]):
-            with suppress(Unprovable):
+            try:
                 return Field(assumptions, chosen)
+            except Unprovable as error:
+                self._causes |= dict.fromkeys((s.residual for s in statements), error.cause)
         return None
 
     def _kept_facts(self, statement: Statement) -> list[Need]:
@@ -530,7 +533,7 @@ class Prover:
         everywhere = self._region(statement, domain.sign, strict=bool(domain.sign) and not ends)
         inner = self._region(statement, domain.sign, strict=True) if ends else everywhere
         if everywhere is None or inner is None:
-            return [Condition(_ALGEBRA, False, "the formulas are too large, or contain unsupported functions")]
+            return [Condition(_ALGEBRA, False, self._causes[statement.residual])]
         # a function of first integrals alone is constant, continuous or not
         moving = [value for value in f.values if not _is_kept(value, statement)]
         obstacles = everywhere.obstacle(moving), inner.obstacle(f.attitude)
