@@ -109,6 +109,7 @@ def test_what_changes_nothing_is_not_planted_and_what_is_unknown_is_refused() ->
     assert set(free.left_out) == {"steiner_forgotten", "steiner_twice", "gravity_9.8"}
     for call, words in (
         (lambda: ht.power(TOP, START, 1, "1e-3", planted="typo"), "Unknown fault 'typo'"),
+        (lambda: ht.power(TOP, START, 1, "1e-3", planted=[]), "planted must be names of faults"),
         (lambda: ht.power(TOP, START, 0, "1e-3"), "must be positive"),
         (lambda: ht.power(TOP, START, 1, "1e-3", "1e-7"), "At most 100000 samples"),
         (lambda: ht.between_samples(TOP, START, 1, 2), "at most until"),

@@ -187,7 +187,7 @@ def _rounded_down(value: float) -> str:
 
 def _names(planted: str | Sequence[str]) -> list[str]:
     names, remedy = planted.split(",") if isinstance(planted, str) else planted, f"Use {', '.join(FAULTS)}, or all."
-    if not isinstance(names, list | tuple) or not all(isinstance(name, str) for name in names):
+    if not isinstance(names, list | tuple) or not names or not all(isinstance(name, str) for name in names):
         raise refusal("planted", "names of faults", quoted(planted), remedy)
     if list(names) == ["all"]:
         return list(FAULTS)
