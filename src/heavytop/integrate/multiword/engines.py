@@ -110,42 +110,27 @@ class DoubleDouble:
 
 
 @dataclass(frozen=True, slots=True)
-class Words:
-    """K words on fixed grids."""
-
-    tolerance: Fraction
-    grid: Grid
-
-    @property
-    def flags(self) -> dict[str, str]:
-        """All that can change bits; the same on every processor."""
-        bits = {"arithmetic": "fixed grids", "words": str(self.grid.words), "bits": str(self.grid.total)}
-        return bits | {"tolerance": decimal_text(self.tolerance, 6)} | _STEP_RULE
-
-    def begin(self, scaled: Scaled, forwards: bool) -> ResumableRun:
-        """A motion at its beginning."""
-        return Fixed(scaled, self.grid, forwards)
-
-
-@dataclass(frozen=True, slots=True)
-class Integers:
-    """Integers of ``bits`` bits, beyond the largest grid."""
+class FixedPoint:
+    """Fixed point: K words on a grid or, beyond the largest, where ``grid`` is None, integers of ``bits`` bits."""
 
     tolerance: Fraction
     bits: int
+    grid: Grid | None = None
 
     @property
     def flags(self) -> dict[str, str]:
         """All that can change bits; the same on every processor."""
-        bits = {"arithmetic": "integers", "bits": str(self.bits)}
-        return bits | {"tolerance": decimal_text(self.tolerance, 6)} | _STEP_RULE
+        kind = {"arithmetic": "fixed grids", "words": str(self.grid.words)} if self.grid else {"arithmetic": "integers"}
+        return kind | {"bits": str(self.bits), "tolerance": decimal_text(self.tolerance, 6)} | _STEP_RULE
 
     def begin(self, scaled: Scaled, forwards: bool) -> ResumableRun:
         """A motion at its beginning."""
-        return IntegerMotion(scaled, self.bits, forwards)
+        if self.grid is None:
+            return IntegerMotion(scaled, self.bits, forwards)
+        return Fixed(scaled, self.grid, forwards)
 
 
-Arithmetic = DoubleDouble | Words | Integers
+Arithmetic = DoubleDouble | FixedPoint
 _STEP_OF_BITS = 64
 
 
@@ -196,9 +181,7 @@ def choose(problem: Problem, tolerance: Fraction | None) -> tuple[Arithmetic, Sc
     accuracy_bits = wanted.denominator.bit_length() - wanted.numerator.bit_length()
     bits = accuracy_bits + _GUARD_BITS + fixed_point_run.spread(scaled) + fixed_point_run.excess(scaled)
     grid = grid_for(bits)
-    if grid is None:
-        return Integers(wanted, -(-bits // _STEP_OF_BITS) * _STEP_OF_BITS), scaled
-    return Words(wanted, grid), scaled
+    return FixedPoint(wanted, grid.total if grid else -(-bits // _STEP_OF_BITS) * _STEP_OF_BITS, grid), scaled
 
 
 def accuracy(arithmetic: Arithmetic, scaled: Scaled) -> int:
@@ -208,7 +191,7 @@ def accuracy(arithmetic: Arithmetic, scaled: Scaled) -> int:
     """
     if isinstance(arithmetic, DoubleDouble):
         return ceil(1 / arithmetic.tolerance).bit_length() - 1
-    return int(arithmetic.flags["bits"]) - _GUARD_BITS - fixed_point_run.spread(scaled) - fixed_point_run.excess(scaled)
+    return arithmetic.bits - _GUARD_BITS - fixed_point_run.spread(scaled) - fixed_point_run.excess(scaled)
 
 
 # Compiled once, and checked before the first use.
@@ -231,9 +214,7 @@ def compiled(arithmetic: Arithmetic, system: System, attitude: bool) -> float:
     """
     if isinstance(arithmetic, DoubleDouble):
         return _double_double(system, attitude)
-    if isinstance(arithmetic, Integers):
-        return _integers(system, attitude)
-    return _words(arithmetic.grid, system, attitude)
+    return _fixed_point(arithmetic.grid, system, attitude)
 
 
 @OncePerArguments
@@ -246,16 +227,11 @@ def _double_double(system: System, attitude: bool) -> float:
 
 
 @OncePerArguments
-def _words(grid: Grid, system: System, attitude: bool) -> float:
-    seconds = fixed_point_run.machine(grid, system, attitude).seconds
-    check(system, attitude, lambda scaled: Fixed(scaled, grid, True), grid.total, bounded=True)
+def _fixed_point(grid: Grid | None, system: System, attitude: bool) -> float:
+    seconds = fixed_point_run.machine(grid, system, attitude).seconds if grid else 0.0
+    numbers = FixedPoint(_FINEST, grid.total if grid else _CHECKED_BITS, grid)
+    check(system, attitude, lambda scaled: numbers.begin(scaled, True), numbers.bits, bounded=True)
     return seconds
-
-
-@OncePerArguments
-def _integers(system: System, attitude: bool) -> float:
-    check(system, attitude, lambda scaled: IntegerMotion(scaled, _CHECKED_BITS, True), _CHECKED_BITS, bounded=True)
-    return 0.0
 
 
 @OncePerArguments
