@@ -19,7 +19,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from pkgutil import resolve_name
 from types import FunctionType
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import msgspec
 
@@ -62,6 +62,7 @@ GROUP = "heavytop.peers"
 STEP_LIMIT = 10**7
 """Steps that are handed to a third-party integrator as a limit, where it takes one."""
 Peer = Callable[..., Trajectory]
+T = TypeVar("T")
 _YOURS = f"Yours is FILE.py:FUNCTION, FILE.toml, or an entry point {GROUP} (`heavytop docs gate`)."
 _PATIENCE = 60
 """Seconds within which a third-party package must tell its control."""
@@ -574,17 +575,7 @@ def control_apart(which: str | IntegratorSource) -> str:
     integrator = described(which)
     if isinstance(integrator.source, Command) or integrator.own:
         return control_name(which)
-    from concurrent.futures.process import BrokenProcessPool
-
-    from heavytop.processes import GuardedProcess
-
-    process = GuardedProcess()
-    try:
-        return process.submit(control_name, which).result(timeout=_PATIENCE)
-    except (BrokenProcessPool, TimeoutError):
-        return ""
-    finally:
-        process.end()
+    return _apart(control_name, which, ended="", late="")
 
 
 def available() -> dict[str, str | None]:
@@ -595,7 +586,12 @@ def available() -> dict[str, str | None]:
     """
     reasons: dict[str, str | None] = {}
     for name, entry in known().items():
-        reasons[name] = (_lacking(name) if entry.lacks else None) if entry.own else _lacking_apart(name, entry)
+        if entry.own:
+            reasons[name] = _lacking(name) if entry.lacks else None
+        else:
+            ended = f"The integrator {name} ends the process that imports it. {entry.remedy}"
+            late = f"The integrator {name} is not imported within {_PATIENCE} s. {entry.remedy}"
+            reasons[name] = _apart(_lacking, name, ended=ended, late=late)
     return reasons
 
 
@@ -608,18 +604,19 @@ def _lacking(name: str) -> str | None:
     return None
 
 
-def _lacking_apart(name: str, entry: Integrator) -> str | None:
+def _apart(call: Callable[[Any], T], argument: Any, *, ended: str, late: str) -> T | str:
+    """``call(argument)`` in a process of its own; ``ended`` where that dies, ``late`` where it takes too long."""
     from concurrent.futures.process import BrokenProcessPool
 
     from heavytop.processes import GuardedProcess
 
     process = GuardedProcess()
     try:
-        return process.submit(_lacking, name).result(timeout=_PATIENCE)
+        return process.submit(call, argument).result(timeout=_PATIENCE)
     except BrokenProcessPool:
-        return f"The integrator {name} ends the process that imports it. {entry.remedy}"
+        return ended
     except TimeoutError:
-        return f"The integrator {name} is not imported within {_PATIENCE} s. {entry.remedy}"
+        return late
     finally:
         process.end()
 
