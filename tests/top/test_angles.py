@@ -2,19 +2,19 @@
 
 import math
 from random import Random
-from types import SimpleNamespace
 
 import pytest
 import sympy
 
 from heavytop.exact.flint.balls import FUNCTIONS, ball, working_precision
+from heavytop.measure.attitude_error import attitude_angle
 from heavytop.precision import cross, dot
 from heavytop.top.attitude import (
     attitude_from_angles,
     euler_angles,
     gamma_from_angles,
     perpendicular,
-    rotation_angle,
+    rows_of,
     unwrap,
 )
 from support.helpers import unit_vector
@@ -60,17 +60,19 @@ def test_the_rotation_angle_keeps_its_digits_near_0() -> None:
     with working_precision(400):
         tiny = ball(10) ** -60
         phi, theta, psi = ball(1), ball(2), ball(3)
-        first = gamma_from_angles(phi, theta, FUNCTIONS), attitude_from_angles(phi, theta, psi, FUNCTIONS)
-        phi = phi + tiny
-        other = gamma_from_angles(phi, theta, FUNCTIONS), attitude_from_angles(phi, theta, psi, FUNCTIONS)
-        angle = rotation_angle(first, other, FUNCTIONS)
+        first, other = (
+            rows_of(gamma_from_angles(angle, theta, FUNCTIONS), attitude_from_angles(angle, theta, psi, FUNCTIONS))
+            for angle in (phi, phi + tiny)
+        )
+        angle = attitude_angle(first, other)
         assert angle.overlaps(tiny)
         assert angle.rel_accuracy_bits() > 90
 
 
 def test_the_rotation_angle_of_a_half_turn_is_pi() -> None:
-    lib = SimpleNamespace(sqrt=lambda x: math.sqrt(max(x, 0.0)), atan2=math.atan2)
-    assert rotation_angle(((0, 0, 1), (1, 0, 0)), ((0, 0, 1), (-1, 0, 0)), lib) == pytest.approx(math.pi)
+    axes = [[ball(int(i == j)) for j in range(3)] for i in range(3)]
+    turned = [[-value for value in row] for row in axes[:2]] + axes[2:]
+    assert float(attitude_angle(axes, turned)) == pytest.approx(math.pi)
 
 
 def test_unwrapped_angles_never_jump_by_more_than_half_a_turn() -> None:

@@ -444,20 +444,6 @@ def euler_angles(gamma: Sequence[Real], xi: Sequence[Real], lib: Library) -> Thr
     return phi, theta, psi
 
 
-def rotation_angle(
-    first: tuple[Sequence[Real], Sequence[Real]], second: tuple[Sequence[Real], Sequence[Real]], lib: Library
-) -> Any:
-    """The angle in [0, π] of the rotation between two attitudes (γ, ξ), each of unit vectors.
-
-    Twice atan2(s, c) with s = |R − 1|/(2√2) and c² = 1 − s²: no digits are lost near 0.
-    """
-    (gamma, xi), (other_gamma, other_xi) = first, second
-    pairs = ((gamma, other_gamma), (xi, other_xi), (cross(gamma, xi), cross(other_gamma, other_xi)))
-    square = sum((a - b) * (a - b) for u, v in pairs for a, b in zip(u, v, strict=True)) / 8
-    cosine_squared = 1 - square
-    return 2 * lib.atan2(lib.sqrt(square), lib.sqrt(cosine_squared))
-
-
 def unwrap(angles: Iterable[Any], turn: Any) -> list[Any]:
     """Angles shifted by multiples of ``turn`` (2π) so that neighbours differ by at most half a turn.
 

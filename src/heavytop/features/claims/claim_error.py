@@ -21,9 +21,10 @@ from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import FUNCTIONS, ball, to_bits, whole_evaluation, working_precision
 from heavytop.exact.solution import ExactSolution
 from heavytop.features.claims.library.ershkov import Branch, PartialCase, Values, partial_case
+from heavytop.measure.attitude_error import attitude_angle
 from heavytop.measure.scalar import largest, to_ball
 from heavytop.precision import Precision, Real, decimal_text, exact, number, shown
-from heavytop.top.attitude import Library, attitude_from_angles, euler_angles, rotation_angle
+from heavytop.top.attitude import Library, attitude_from_angles, euler_angles, rows_of
 
 MODEL_BITS = 160
 
@@ -92,7 +93,7 @@ def _difference(claim: Values[arb], claimed_xi: Sequence[arb], truth: Sequence[a
             phi,
             theta,
             psi,
-            rotation_angle((claim.gamma, claimed_xi), (gamma, xi), FUNCTIONS),
+            attitude_angle(rows_of(claim.gamma, claimed_xi), rows_of(gamma, xi)),
         )
 
 
