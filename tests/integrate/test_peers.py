@@ -141,15 +141,16 @@ def test_a_broken_peer_is_an_error_in_words(name: str, cause: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("module", "said"), [("os._exit(7)", "ends the process that"), ("time.sleep(99)", "is not imported within 3 s")]
+    ("module", "seconds", "said"),
+    [("os._exit(7)", 60, "ends the process that"), ("time.sleep(99)", 3, "is not imported within 3 s")],
 )
 def test_a_package_that_ends_or_holds_its_process_is_listed_with_its_reason(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str, said: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str, seconds: int, said: str
 ) -> None:
     (tmp_path / "harmful.py").write_text(f"import os, time\n{module}\n")
     named_peers(tmp_path, {"harmful": "harmful:x"})
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(registry, "_PATIENCE", 3)
+    monkeypatch.setattr(registry, "_PATIENCE", seconds)
     assert said in str(registry.available()["mine:harmful"])
     assert registry.available()["heyoka"] is None
 
