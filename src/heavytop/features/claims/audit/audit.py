@@ -103,8 +103,6 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> FileClaim | ValueC
 
 def _unused(content: ClaimFile) -> Iterator[str]:
     """Entries of a claim that its audit would ignore."""
-    if content.integral is not None:  # it holds, or fails, at a state and not at a time
-        yield from (name for name, given in (("domain", content.domain != "all"), ("times", content.times)) if given)
     component, angles, attitude = content.component, ("phi", "theta", "psi"), ("angles", "quaternion", "matrix")
     unused = {
         "[start]": (content.start, attitude if component else ("omega", "gamma", *attitude)),
