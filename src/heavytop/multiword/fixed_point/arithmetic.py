@@ -123,7 +123,8 @@ class Accumulator:
     def add_product(self, a: list[Operand], b: list[Operand], watched: bool = False, below: bool = False) -> None:
         """Add a b, of words numbered from 0 that count from level ``base`` on.
 
-        Terms of the last level are summed before they are added to it, as the next product depends on its sum.
+        Levels do not wait for each other: low parts are added after the products of all but the last two.  Terms of the
+        last level are summed before they are added to it, as the next product depends on its sum.
 
         watched: check a sum after each of its products, not only where low parts are added to it.
         below: include the products of the level below the last, rounded.
@@ -132,20 +133,22 @@ class Accumulator:
         if last == 0:
             self.sums[0] = code.fma(a[0], b[0], self.sums[0])
             return
+        lows = list[Operand]()
         for k in range(last):
-            lows = []
+            if k == last - 1:
+                for level, low in enumerate(lows, 1):
+                    self.look(level)
+                    self.sums[level] = passed_on(code, self.grid, low, self.sums[level])
+                    self.look(level)
+            parts = []
             for i in range(k + 1):
                 total = code.fma(a[i], b[k - i], self.sums[k])
-                part = total - self.sums[k]
-                lows.append(code.fma(a[i], b[k - i], -part))
+                parts.append(code.fma(a[i], b[k - i], -(total - self.sums[k])))
                 self.sums[k] = total
                 if k == 0 or watched:
                     self.look(k)
-            low = in_pairs(lows)
-            if k + 1 < last:
-                self.look(k + 1)
-                self.sums[k + 1] = passed_on(code, self.grid, low, self.sums[k + 1])
-                self.look(k + 1)
+            lows.append(in_pairs(parts))
+        low = lows[-1]
         if self.grid.relative:
             low *= self.grid.apart
         pairs = [(i, last - i) for i in range(last + 1)] + [(i, last + 1 - i) for i in range(1, last + 1) if below]
