@@ -331,9 +331,10 @@ def test_a_gate_in_which_an_integrator_has_no_number_is_not_passed(tmp_path: Pat
     measure = f'[[measure]]\nkind = "drift"\ncases = ["euler"]\nintegrator = "mine.toml"\nruns = {runs}\n'
     (tmp_path / "gate.toml").write_text(f'name = "gate"\n{measure}')
     assert run("gate", "--bless", cwd=tmp_path).returncode == 3
-    done = run("gate", "--json", "--markdown", "changes.md", cwd=tmp_path)
+    done = run("gate", "--json", *["--markdown", "changes.md", "--junit", "changes.xml"], cwd=tmp_path)
     said = json.loads(done.stdout)
     assert (done.returncode, said["verdict"]) == (3, "incomparable")
-    sentence = "Not comparable: no row of mine has a number."
-    assert sentence in said["findings"]
-    assert sentence in (tmp_path / "changes.md").read_text()
+    assert "1 row of mine cannot be compared: no row of mine has a number." in said["findings"]
+    for text in (done.stdout, *(tmp_path.joinpath(f"changes.{form}").read_text() for form in ("md", "xml"))):
+        assert "no row of mine has a number" in text
+    assert run("compare", *[".heavytop/baseline", ".heavytop/new"], cwd=tmp_path).returncode == 3

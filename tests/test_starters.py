@@ -60,6 +60,7 @@ def test_a_folder_is_complete_and_works_at_once_where_its_compiler_is_there(lang
     (command,) = commands_in(folder / "mine.toml")
     tasks = read(str(folder / "gate.toml"), KINDS)[2]
     assert {task.key.kind for task in tasks} == {"drift", "local_error", "homoclinic", "work_precision"}
+    assert min(task.times[0] for task in tasks) < 0  # backward too
     build(folder, language)
     try:
         case, solve = CASES["generic"], registry.ready(command)

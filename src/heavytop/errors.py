@@ -176,8 +176,8 @@ class NotInClass(InputError):
     """A start outside the class of motions of a closed form; names the failed exact test and by how much it failed."""
 
 
-class NoSuchFunction(InputError):
-    """A Python file has no such function."""
+class NoSuchIntegrator(InputError):
+    """No such function in a Python file, or no such program."""
 
 
 class LevelNotDone(NotInClass):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from heavytop.errors import NoSuchFunction
+from heavytop.errors import NoSuchIntegrator
 from heavytop.harness import integrator_check
 from heavytop.harness.integrator_check import check
 from heavytop.integrate.registry import named
@@ -150,5 +150,5 @@ def test_a_function_that_a_file_does_not_have_is_no_violation(tmp_path: Path) ->
     made = "from heavytop.integrate.peers.double import double_peer\nm = double_peer('it', 4, solve)\n"
     (tmp_path / "mine.py").write_text(f"def solve(request): pass\n{made}")
     solve = named(f"{tmp_path}/mine.py:solv")
-    with pytest.raises(NoSuchFunction, match=r"does not define solv\.\n  Did you mean solve\? It defines solve, m\."):
+    with pytest.raises(NoSuchIntegrator, match=r"does not define solv\.\n  Did you mean solve\? It defines solve, m\."):
         integrator_check._judged("start", solve.load)

@@ -24,6 +24,7 @@ WORK = (
     "[[measure]]\nkind = 'work_precision'\ncases = ['euler']\nhorizon = '10'\n"
     "ladders = [{ integrator = 'heyoka', tolerances = ['1e-3', '0.001'] }]\n"
 )
+PROGRAMS = "".join(f"[[integrator]]\nname = '{name}'\ncommand = ['x']\n" for name in "abc")
 AUDIT = "[[measure]]\nkind = 'audit'\nclaims = ['ershkov-partial']\n"
 LIBRARY = AUDIT.replace("ershkov-partial", "library")
 CARRIED = AUDIT.replace("ershkov-partial", "sretensky-gyrostat")
@@ -101,7 +102,7 @@ def test_the_asymptotic_case_tends_to_its_saddle_at_its_rate() -> None:
         (f"{LIBRARY}systems = ['gyrostat']", "is about heavy_top, but systems = ['gyrostat']"),
         (f"{MEASURE}[[measure]]\nkind='drift'\ncases=[]\nruns=[]", "A [[measure]] of the plan"),
         (f"{MEASURE}[[measure]]\nkind='local_error'\ncases=['euler']\nhorizon='1'\nprecisions=[]", "measures nothing"),
-        (f"{MEASURE}[[integrator]]\nname = 'mine'\ncommand = ['x']", "measures none of the integrators that it"),
+        (f"{MEASURE}integrator = 'a'\n{PROGRAMS}", "integrators that it does not measure: b, c."),
         ("[[measure]]\nkind = 'hunt'\nagainst = 'heyoka'", "integrator and against must differ"),
         (MEASURE.replace("euler", "oiler"), "Unknown case 'oiler'.   Did you mean euler?"),
         (MEASURE.replace("double", "float"), "Unknown precision 'float'"),

@@ -104,7 +104,10 @@ def test_a_limit_alone_is_named_and_is_no_loss_of_order() -> None:
 
 def test_a_row_that_no_sentence_names_is_no_other_row() -> None:
     old = rk5(metrics={DIGITS: error("1e-9"), "drift_energy_max": error("1e-9")})
-    assert found([old], [replace(old, metrics={DIGITS: error("1e-9")})]) == ["1 row changed."]
+    new = replace(old, metrics={**old.metrics, "drift_area_max": error("1e-9")})
+    assert found([old], [new]) == ["1 row changed."]
+    lost = "Drift of M·γ 1e-9 → - on euler up to T = 100 (mine:rk5, double), the metric is missing."
+    assert found([new], [old]) == [lost, "No other row changed."]
 
 
 def test_rows_of_two_versions_are_one_row_and_both_versions_are_said() -> None:
@@ -180,7 +183,8 @@ def test_a_row_that_failed_in_both_reports_is_the_same_and_said() -> None:
     pair = [rk5(), failing(rk5(case="delone"))]
     said = "1 row of mine:rk5 failed in both reports on delone up to T = 100 (mine:rk5, double): it returned NaN."
     assert found(pair, pair) == ["Nothing changed: 2 metrics are within the limits.", said]
-    assert found(pair[1:], pair[1:]) == [said]
+    none = "1 row of mine:rk5 cannot be compared: no row of mine:rk5 has a number."
+    assert found(pair[1:], pair[1:])[:2] == [none, said]
     worse = [replace(pair[0], metrics={"drift_energy_max": error("1")}), pair[1]]
     assert said in found(pair, worse)
 

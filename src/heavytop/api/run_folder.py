@@ -27,7 +27,7 @@ from heavytop.harness.rows import Task
 from heavytop.harness.run import Progress, unheard
 from heavytop.harness.run import run as run_tasks
 from heavytop.integrate.peers.command import Command, greeting
-from heavytop.integrate.registry import is_third_party, name_of, named, seconds_of
+from heavytop.integrate.registry import name_of, named, seconds_of
 from heavytop.records import SCHEMA, Report, Row
 from heavytop.report.document.document import row_name
 from heavytop.report.render import page, text
@@ -44,26 +44,15 @@ MOST_ON_A_PAGE = 5000
 
 @dataclass(frozen=True, slots=True)
 class FinishedRun:
-    """A finished run: its summary, whether no row failed, and the third-party integrators without a number."""
+    """A finished run: its summary and whether no row failed."""
 
     summary: str
     good: bool
-    unmeasured: list[str]
 
     @classmethod
     def of(cls, report: Report, rows: Callable[[], Iterable[Row]]) -> FinishedRun:
         """The run with that report; rows: returns its rows at each call."""
-        return cls(brief(report, rows(), KINDS), text.all_good(rows(), KINDS), _unmeasured(rows()))
-
-
-def _unmeasured(rows: Iterable[Row]) -> list[str]:
-    """The names of the third-party integrators of which no row has a number."""
-    measured: dict[str, bool] = {}
-    for row in rows:
-        subject = row.key.subject
-        if subject.what == "computed" and is_third_party(subject.name):
-            measured[subject.name] = measured.get(subject.name, False) or bool(row.metrics)
-    return [name for name, numbers in measured.items() if not numbers]
+        return cls(brief(report, rows(), KINDS), text.all_good(rows(), KINDS))
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,20 +79,17 @@ def gate(
             raise
         say(f"nothing to compare with: {error.cause}")
         return _bless(ended, None, (trusted, baseline), (fresh, out), json)
-    unmeasured = differences.exit_code is ExitCode.GOOD and ended.unmeasured
-    if unmeasured:
-        differences.sentences.append(f"Not comparable: no row of {', '.join(unmeasured)} has a number.")
     write_comparison(differences, markdown, junit, html)
     if bless:
         return _bless(ended, differences, (trusted, baseline), (fresh, out), json)
     if json:
-        print_json(differences.to_json() | ({"verdict": "incomparable"} if unmeasured else {}))
+        print_json(differences.to_json())
     else:
         print(f"{ended.summary}\n")
         by_rules = f" --policy {quote(str(rules))}" if rules else ""
         show = f"heavytop compare {quote(str(baseline))} {quote(str(out))}{by_rules} --full"
         show_on_terminal(comparison(differences, for_full=show))
-    return ExitCode.INCOMPLETE if unmeasured else differences.exit_code
+    return differences.exit_code
 
 
 def _require_usable(files: Iterable[Path | None], baseline: Path, fresh: Path) -> None:

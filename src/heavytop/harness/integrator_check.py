@@ -18,7 +18,7 @@ from typing import Any, Literal, NamedTuple
 import msgspec
 
 from heavytop.cases import CASES
-from heavytop.errors import HeavyTopError, InputError, NoSuchFunction, PeerFailed, Unsupported
+from heavytop.errors import HeavyTopError, InputError, NoSuchIntegrator, PeerFailed, Unsupported
 from heavytop.integrate import registry
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.peers.command import (
@@ -276,8 +276,9 @@ class _Contract:
             with session(self.program) as program:
                 greeting = program.greeting
         except PeerFailed as error:
-            remedy = f". {COMMAND_REMEDY}" if error.remedy == COMMAND_REMEDY else ""
-            raise _Violated(f"{error.cause}{remedy}") from None
+            if error.remedy == COMMAND_REMEDY:
+                raise NoSuchIntegrator(f"{error.cause}.", COMMAND_REMEDY) from None
+            raise
         if len(greeting.split()) < 2:
             raise _Note(f"The greeting must be ready NAME VERSION; got ready {greeting}".rstrip() + ".")
         return f"Name and version: {greeting}."
@@ -583,7 +584,7 @@ def _judged(name: str, part: Callable[[], str]) -> Checked:
         return Checked(name, "note", str(note))
     except Unsupported as error:
         return Checked(name, "note", error.cause)
-    except NoSuchFunction:
+    except NoSuchIntegrator:
         raise
     except (_Violated, HeavyTopError) as error:
         return Checked(name, "violated", f"{_cause(error).removesuffix('.')}.")

@@ -125,9 +125,9 @@ def read(
         if integrator:
             integrator = defined.get(integrator, integrator) if isinstance(integrator, str) else integrator
             plan = with_integrator(plan, integrator)
-        elif defined and defined.keys().isdisjoint(_integrators(plan)):
-            cause = f"The plan {plan.name} measures none of the integrators that it defines: {', '.join(defined)}."
-            raise InputError(cause, "Name one as the integrator of a [[measure]], or as --integrator.")
+        elif unused := ", ".join(sorted(defined.keys() - _integrators(plan))):
+            cause = f"The plan {plan.name} defines integrators that it does not measure: {unused}."
+            raise InputError(cause, "Name each in a [[measure]]; FILE.toml:NAME defines one of several in a file.")
         if not isinstance(integrator, str):
             defined = defined | {integrator.name: integrator}
         return plan, digest, expand(plan, seed, defined)

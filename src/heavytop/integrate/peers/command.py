@@ -46,7 +46,7 @@ HELLO = "heavytop-integrator 1"
 PYTHON = "{python}"
 """In a command, the Python interpreter of heavytop."""
 COMMAND_REMEDY = (
-    "Correct `command`: a program on the PATH or relative to its file, then each argument as an item of its own."
+    "Build it, or correct `command`: a program on the PATH or relative to its file, each argument an item of its own."
 )
 NOT_COUNTED = {"steps": "not counted"}
 """The flag of a run whose program did not report its number of steps."""

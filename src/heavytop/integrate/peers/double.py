@@ -231,8 +231,8 @@ def _request(name: str, control: str, problem: Problem, times: Sequence[Fraction
 def _solution_with_start(name: str, request: Request, solve: Solve) -> Solution:
     """The solution of ``solve`` at the times after 0, which most libraries refuse, behind the start itself."""
     at_start = int(request.times[0] == 0)
-    # a copy: a solver may change its argument, and the result is judged by these times
-    later = replace(request, times=request.times[at_start:].copy())
+    # copies: a solver may change its argument, and the result is judged by these times and this start
+    later = replace(request, start=request.start.copy(), times=request.times[at_start:].copy())
     solved = solve(later) if len(later.times) else Solution(numpy.empty((0, request.width)), 0.0, 0, 0)
     if not isinstance(solved, Solution):
         raise PeerFailed(

@@ -15,7 +15,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-from heavytop.errors import InputError, NoSuchFunction, PeerFailed, meant
+from heavytop.errors import InputError, NoSuchIntegrator, PeerFailed, meant
 from heavytop.files import readable
 from heavytop.integrate.peers.contract import contained, quiet, said
 
@@ -47,7 +47,7 @@ class PythonFile:
             own = (name for name, item in functions.items() if item.__module__ == module.__name__)
             defined = [*own, *(name for name, item in functions.items() if hasattr(item, "integrator_name"))]
             remedy = f"{meant(self.function, defined)}It defines {', '.join(defined) or 'no function'}."
-            raise NoSuchFunction(f"{self.path} does not define {self.function}.", remedy) from None
+            raise NoSuchIntegrator(f"{self.path} does not define {self.function}.", remedy) from None
         return as_peer(call, self.name)
 
 

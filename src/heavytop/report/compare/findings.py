@@ -255,7 +255,7 @@ def sentences(changes: Changes, same: int, failed: Sequence[Row] = (), unsupport
     ranked = [*_explained(changes), *(sentence for moved, sentence in orders if moved < 0)]
     by_rank = sorted(changes.rows, key=lambda change: RANK.index(change.verdict))
     ranked += _whole_rows(by_rank, Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING)
-    for verdicts in ({Verdict.WORSE, Verdict.INCOMPARABLE}, {Verdict.BETTER}):
+    for verdicts in ({Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING}, {Verdict.BETTER}):
         rows = [change for change in changes.worst_first if change.verdict in verdicts]
         for make in (_digits_moved, _steps_moved, _laws_moved, partial(_others_moved, changes)):
             ranked += make(rows, verdicts)
@@ -476,7 +476,8 @@ def _fate(change: Change) -> tuple[str, str]:
         return "are missing", ""
     if change.verdict is Verdict.NEW:
         return "are new", ""
-    if change.new is None or change.new.outcome == "success":
+    as_before = change.old is not None and change.new is not None and change.old.outcome == change.new.outcome
+    if change.new is None or change.new.outcome == "success" or (as_before and change.verdict is Verdict.INCOMPARABLE):
         became = {Verdict.BETTER: "are better", Verdict.WORSE: "are worse"}
         return became.get(change.verdict, "cannot be compared"), change.findings[0].reason
     if change.new.outcome == UNSUPPORTED:
