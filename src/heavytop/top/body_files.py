@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from heavytop.display import plural
-from heavytop.errors import InputError, prefixed, quoted, refusal
+from heavytop.errors import InputError, nearest, prefixed, quoted, refusal
 from heavytop.files import read_whole, readable
 from heavytop.precision import Vector, cross, exact, round_to, six_digits, vector
 from heavytop.top import inertia_slips
@@ -145,11 +145,39 @@ def _xml(path: Path, content: bytes) -> Iterator[Link]:
         raise InputError(f"{path} {cause}.", "Write it out without them." if refused else _FORMATS) from None
     for element in root.iter():
         element.tag = element.tag.rpartition("}")[2]  # a namespace changes no meaning
+    for element in root.iter():
+        _require_spelt(
+            f"<{element.tag}>", [*element.attrib, *(part.tag for part in element)], _READ.get(element.tag, ())
+        )
     if root.tag in ("mujoco", "mujocoinclude"):
         return _mjcf(path, root)
     if root.tag not in ("robot", "sdf"):
         raise InputError(f"The root element of {path} is <{root.tag}>.", _FORMATS)
     return _of_links(root, _urdf if root.tag == "robot" else _sdf)
+
+
+_READ = {
+    "mujoco": ("compiler", "option"),
+    "compiler": (
+        *("angle", "eulerseq", "coordinate", "inertiafromgeom", "fusestatic", "settotalmass"),
+        *("boundmass", "boundinertia", "balanceinertia"),
+    ),
+    "option": ("gravity", "flag"),
+    "flag": ("gravity",),
+    "body": ("inertial", "gravcomp", "childclass"),
+    "world": ("gravity",),
+    "link": ("inertial", "gravity"),
+}
+"""Attributes and parts of elements that change mass properties or gravity; the formats have many others."""
+_ALIKE = 0.8
+"""Similarity from which a name is a misspelling of another."""
+
+
+def _require_spelt(where: str, names: Iterable[str], read: Sequence[str]) -> None:
+    """Raises InputError for a misspelling of a name that is read."""
+    for name in names:
+        if name not in read and (near := nearest(name, read, _ALIKE)):
+            raise InputError(f"{where}: unknown {name}.", f"Did you mean {near}?")
 
 
 _Around = Mapping["Element", "Element"]
@@ -208,7 +236,7 @@ class _Numbers:
         return self.some(text, what, 1, default)[0]
 
     def flag(self, text: str | None, what: str) -> bool:
-        """A boolean of SDF, false where it is missing."""
+        """A boolean of SDF or of an extension of URDF, false where it is missing."""
         value = (text or "").strip().lower() or "false"
         if value not in ("true", "1", "false", "0"):
             raise refusal(f"{self.where}: {what}", "true or false", quoted(value), "Give one of them.")
@@ -306,7 +334,10 @@ def _urdf(name: str, link: Element, inertial: Element, around: _Around) -> BodyI
     value = numbers.one(numbers.attributes(inertial.find("mass"), "value").get("value"), "mass")
     axes, centre = _origin(numbers, inertial)
     shape = _shape_of(_shapes(numbers, link, partial(_origin, numbers)), centre)
-    return BodyInFile(name, value, centre, _in_axes(axes, six), slack, *shape)
+    of_gazebo = [part for part, outer in around.items() if outer.tag == "gazebo" and outer.get("reference") == name]
+    switches = [part for part in of_gazebo if part.tag in ("gravity", "turnGravityOff")]
+    falls = all(numbers.flag(part.text, part.tag) == (part.tag == "gravity") for part in switches)
+    return BodyInFile(name, value, centre, _in_axes(axes, six), slack, *shape, gravity=EARTH if falls else _ZERO)
 
 
 def _origin(numbers: _Numbers, element: Element) -> Pose:
@@ -463,10 +494,14 @@ class _SdfFrames:
         """The gravity of the world around the link, zero where the link is exempt."""
         if not self.numbers.flag(self.link.findtext("gravity") or "true", "gravity"):
             return _ZERO
-        worlds = [part for part in self.around.values() if part.tag == "world"]
-        if worlds:
-            self.numbers.require_once(worlds[0], "gravity")
-        return self.numbers.three(worlds[0].findtext("gravity"), "gravity", "0 0 -9.8") if worlds else EARTH
+        world = self.link
+        while world.tag != "world":
+            if world not in self.around:
+                return EARTH
+            world = self.around[world]
+        self.numbers.require_once(world, "gravity")
+        text = world.findtext("gravity", world.findtext("physics/gravity"))  # there up to SDF 1.4
+        return self.numbers.three(text, "gravity", "0 0 -9.8")
 
 
 def _base(element: Element) -> str:
@@ -498,6 +533,9 @@ def _pose(numbers: _Numbers, pose: Element | None) -> Pose:
 def _mjcf(path: Path, root: Element) -> Iterator[Link]:
     """Bodies with an inertial element, read exactly; those that MuJoCo computes or includes, read by MuJoCo."""
     settings = {key: value for compiler in root.iter("compiler") for key, value in compiler.attrib.items()}
+    for key, value in [*settings.items(), *(pair for flag in root.iter("flag") for pair in flag.items())]:
+        if not re.fullmatch(words := _WORDS.get(key, ".*"), value):
+            raise refusal(key, words.replace("|", " or "), quoted(value), "Correct the file.")
     if settings.get("coordinate", "local") != "local":
         raise InputError(f"{path} uses global coordinates.", "Load and save it in MuJoCo 2.3.3: they become local.")
     fused = any(settings.get(key, "auto") not in ("auto", "false") for key in ("inertiafromgeom", "fusestatic"))
@@ -514,6 +552,15 @@ def _mjcf(path: Path, root: Element) -> Iterator[Link]:
             yield name, partial(by_mujoco, path, name, index)
     if root.find(".//attach") is not None:
         yield from _included(path, {body.get("name") for body in root.iter("body")})
+
+
+_WORDS = {
+    "angle": "degree|radian",
+    "eulerseq": "[xyzXYZ]{3}",
+    "balanceinertia": "true|false",
+    "gravity": "enable|disable",
+}
+"""Values of settings and flags that are read, as patterns."""
 
 
 def _gravity(root: Element) -> Vector:
@@ -556,6 +603,8 @@ def _mjcf_body(name: str, body: Element, parts: _Parts, frames: _MjcfFrames) -> 
         six = (mean, mean, mean, *_ZERO)
     axes, centre = frames.pose(numbers, inertial, around)
     balls = [pair for pair in parts if frames.attributes(pair[0]).get("type") == "ball"]
+    if any(numbers.one(frames.attributes(ball).get("armature"), "armature", "0") for ball, _ in balls):
+        raise InputError(f"{numbers.where}: the armature of its ball joint moves with no rigid body.", "Set it to 0.")
     joint = frames.pose(numbers, *balls[0])[1] if balls else None
     shape = _shape_of(frames.shapes(numbers, parts), centre)
     x, y, z = ((1 - numbers.one(body.get("gravcomp"), "gravcomp", "0")) * value for value in frames.gravity)
@@ -735,16 +784,16 @@ def _of_axes(x: Sequence[Fraction], y: Sequence[Fraction]) -> Tensor:
 
 
 _PRIM = re.compile(r'(?:def|over)\s+(?:\w+\s+)?"([^"]*)"')
-_USD_NAMES = ("mass", "centerOfMass", "diagonalInertia", "principalAxes")
-_USD = re.compile(rf"physics:({'|'.join(_USD_NAMES)})\s*=\s*(\([^)]*\)|[^\s]+)")
+_USD_NAMES = ("mass", "centerOfMass", "diagonalInertia", "principalAxes", "disableGravity")
+_STAGE = ("metersPerUnit", "kilogramsPerUnit", "gravityMagnitude")
+_USD = re.compile(rf"(?:physics|physxRigidBody):({'|'.join(_USD_NAMES)})\s*=\s*(\([^)]*\)|[^\s]+)")
 
 
 def _usd(text: str) -> Iterator[Link]:
     """Prims of USD as text that have a mass and a diagonal inertia; by their names."""
-    units = {
-        key: exact(value) for key, value in re.findall(r"\b(metersPerUnit|kilogramsPerUnit)\s*=\s*([-+.\deE]+)", text)
-    }
-    text = re.sub(r"(?m)#.*$", "", text)
+    text = re.sub(r"(?s)#[^\n]*|/\*.*?\*/", "", text)
+    _require_spelt("USD", re.findall(r"(\w+)\s*=", text), (*_USD_NAMES, *_STAGE))
+    units = {key: exact(value) for key, value in re.findall(rf"\b({'|'.join(_STAGE)})\s*=\s*([.\d][-+.\deE]*)", text)}
     starts = [*_PRIM.finditer(text)]
     for index, prim in enumerate(starts):
         end = starts[index + 1].start() if index + 1 < len(starts) else len(text)
@@ -771,7 +820,10 @@ def _prim(name: str, values: Mapping[str, str], units: Mapping[str, Fraction]) -
     a, b, c, d, e, f = (value * scale for value in _in_axes(turn, six))
     x, y, z = (value * length for value in numbers.three(values.get("centerOfMass"), "centerOfMass", "0 0 0"))
     mass = numbers.one(values["mass"], "mass") * kilogram
-    return BodyInFile(name, mass, (x, y, z), (a, b, c, d, e, f), slack * scale)
+    free = values.get("disableGravity", "0").lower() in ("1", "true")
+    earth = -EARTH[2] / length  # also where the scene has -inf
+    gravity = (Fraction(0), Fraction(0), Fraction(0) if free else -units.get("gravityMagnitude", earth) * length)
+    return BodyInFile(name, mass, (x, y, z), (a, b, c, d, e, f), slack * scale, gravity=gravity)
 
 
 _BINARY_USD = (b"PXR-USDC", b"PK\x03\x04")
@@ -799,8 +851,13 @@ def composed_usd(path: Path) -> Iterator[Link]:
         "metersPerUnit": exact(repr(UsdGeom.GetStageMetersPerUnit(stage))),
         "kilogramsPerUnit": exact(repr(UsdPhysics.GetStageKilogramsPerUnit(stage))),
     }
+    for prim in stage.Traverse():
+        magnitude = prim.GetAttribute("physics:gravityMagnitude").Get()
+        if magnitude is not None and 0 <= magnitude < float("inf"):
+            units["gravityMagnitude"] = exact(_printed(magnitude))
     for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
-        attributes = {name: prim.GetAttribute(f"physics:{name}") for name in _USD_NAMES}
+        attributes = {name: prim.GetAttribute(f"physics:{name}") for name in _USD_NAMES[:-1]}
+        attributes["disableGravity"] = prim.GetAttribute("physxRigidBody:disableGravity")
         first = {name: part.Get(Usd.TimeCode.EarliestTime()) for name, part in attributes.items()}
         values = {name: _printed(value) for name, value in first.items() if attributes[name].HasAuthoredValue()}
         if {"mass", "diagonalInertia"} <= values.keys():

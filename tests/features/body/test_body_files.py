@@ -415,6 +415,12 @@ def of_class(sequence: str) -> tuple[str, str]:
 
 BEGIN = "0.1 0 0.2 2.5 0.31 0.28 0.19 9.81"
 ARM = f"{BEGIN} 0.05 -0.02 0.04"
+WEIGHTLESS = '<gazebo reference="arm"><{0}>{1}</{0}></gazebo></robot>'
+SCENE = (
+    '#usda 1.0\n(\n metersPerUnit = 0.01\n)\ndef "s" {{\n physics:gravityMagnitude = {}\n}}\n'
+    'def "a" {{\n physics:mass = 2\n'
+    " physics:diagonalInertia = (300, 500, 400)\n /* physics:mass = 3 */\n {} = (10, 0, 20)\n}}\n"
+)
 INCLUDED = mjcf(SIX).replace("mujoco>", "mujocoinclude>").replace("<worldbody>", "").replace("</worldbody>", "")
 ENCODED = '<?xml version="1.0" encoding="{}"?><!-- \xe9 -->' + urdf(SIX)
 TURNED = urdf(SIX).replace('rpy="0 0 0"', 'quat_xyzw="0 0 1 0" x:note="1"').replace("<robot", '<robot xmlns:x="x"')
@@ -460,6 +466,21 @@ READ: dict[str, tuple[tuple[str, str | bytes], str]] = {
     "ball of a frame": (in_sdf(joint=JOINT.format("g", "")), "-0.9 0 0.7 2 0.03 0.05 0.04 9.81"),
     "moon": (in_sdf(gravity="<gravity>0 0 -1.62</gravity>"), "0.1 0 0.2 2 0.03 0.05 0.04 1.62"),
     "world": (in_sdf(gravity="<gui/>"), "0.1 0 0.2 2 0.03 0.05 0.04 9.8"),
+    "moon of SDF 1.4": (
+        in_sdf(gravity="<physics><gravity>0 0 -1.62</gravity></physics>"),
+        "0.1 0 0.2 2 0.03 0.05 0.04 1.62",
+    ),
+    "moon in USD": (("usda", SCENE.format("162", "physics:centerOfMass")), "0.1 0 0.2 2 0.03 0.05 0.04 1.62"),
+    "earth in USD": (("usda", SCENE.format("-inf", "physics:centerOfMass")), "0.1 0 0.2 2 0.03 0.05 0.04 9.81"),
+    "no gravity in USD": (
+        ("usda", SCENE.format("162", "physxRigidBody:disableGravity = 1\n physics:centerOfMass")),
+        "0.1 0 0.2 2 0.03 0.05 0.04 0",
+    ),
+    "no gravity in Gazebo": (
+        ("urdf", urdf(SIX).replace("</robot>", WEIGHTLESS.format("turnGravityOff", "true"))),
+        ARM.replace("9.81", "0"),
+    ),
+    "gravity in Gazebo": (("urdf", urdf(SIX).replace("</robot>", WEIGHTLESS.format("gravity", "1"))), ARM),
     "exempt": (in_sdf(exempt="<gravity>0</gravity>"), "0.1 0 0.2 2 0.03 0.05 0.04 0"),
 }
 
@@ -529,6 +550,13 @@ REFUSED = {
         leg('xyz="0.1 0 0.2"', 'rpy="0 0 0" quat_xyzw="0 0 0 1"'),
         "origin has both rpy and quat_xyzw",
     ),
+    "gravty": (in_mjcf(BALL, '<option gravty="0 0 -1.62"/>'), "<option>: unknown gravty.\n  Did you mean gravity?"),
+    "Disable": (in_mjcf(BALL, '<option><flag gravity="Disable"/></option>'), "enable or disable; got 'Disable'"),
+    "radians": (in_mjcf(BALL, '<compiler angle="radians"/>'), "degree or radian; got 'radians'"),
+    "settotalmas": (in_mjcf(BALL, '<compiler settotalmas="5"/>'), "Did you mean settotalmass?"),
+    "armature": (in_mjcf(f'<joint type="ball" armature="1"/>{BALL}'), "armature of its ball joint"),
+    "centreOfMass": (("usda", SCENE.format("9.81", "physics:centreOfMass")), "Did you mean centerOfMass?"),
+    "gravty of SDF": (in_sdf(gravity="<gravty>0 0 -1.62</gravty>"), "<world>: unknown gravty"),
     "Ixz of SDF": (("sdf", sdf(SIX).replace("ixz>", "Ixz>")), "unknown element Ixz of <inertia>"),
     "degree": (in_sdf('degree="true"'), "unknown attribute degree of <pose>"),
     "Quat": (("xml", mjcf(SIX).replace("pos=", 'Quat="0 1 0 0" pos=')), "unknown attribute Quat of <inertial>"),

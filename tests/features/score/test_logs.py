@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy
 import pytest
+from scipy.spatial.transform import Rotation
 
 import heavytop as ht
 from heavytop.errors import InputError
@@ -39,6 +40,10 @@ def quaternions() -> numpy.ndarray:
 
 def scalar_last() -> numpy.ndarray:
     return quaternions()[:, [1, 2, 3, 0]]
+
+
+def matrices() -> numpy.ndarray:
+    return Rotation.from_quat(scalar_last()).as_matrix()
 
 
 def omegas() -> numpy.ndarray:
@@ -214,6 +219,44 @@ FORMS |= {
     "milliseconds": (
         "csv",
         lambda: exported("time_ms", [str(100 * k) for k in range(11)], "pose_orientation_", "pose_angular_"),
+    ),
+    "rosbag2 with two stamps": (
+        "csv",
+        lambda: exported(
+            "timestamp,.header.stamp.sec,.header.stamp.nanosec",
+            [f"{int(time) + 7 * k * k},{split}" for k, (time, split) in enumerate(zip(NANO, SPLIT, strict=True))],
+            ".orientation.",
+            "body.omega.",
+        ),
+    ),
+    "milliseconds since 1970": (
+        "csv",
+        lambda: exported("TIME", [time[:-6] for time in NANO], "orientation.", "angular_velocity."),
+    ),
+    "nanoseconds since 1970": ("csv", lambda: exported("time_ns", NANO, "orientation.", "angular_velocity.")),
+    "local time": (
+        "csv",
+        lambda: exported("Time", [f"2026-01-31 12:00:0{k / 10:.1f}" for k in range(11)], "orientation.", "gyro_"),
+    ),
+    "brackets with commas": (
+        "csv",
+        lambda: "\n".join(
+            [f"{HEAD}t," + ",".join(f'"R({i},{j})"' for i in (1, 2, 3) for j in (1, 2, 3)), rows(TIMES, matrices())]
+        ),
+    ),
+    "OpenSim in degrees": (
+        "sto",
+        lambda: (
+            f"# sequence: ZYX\n{HEAD}motion\ninDegrees=yes\nendheader\ntime yaw pitch roll\n"
+            + rows(TIMES, Rotation.from_matrix(matrices()).as_euler("ZYX", degrees=True), separator=" ")
+        ),
+    ),
+    "a link of ROS, positions in inches": (
+        "csv",
+        lambda: (
+            f"# link: base\n{HEAD}t [days],qw,qx,qy,qz,x [in],y [in],z [in]\n"
+            + rows([time / 86400 for time in TIMES], quaternions(), run().positions() / 0.0254)
+        ),
     ),
     "Basilisk": ("csv", lambda: f"{HEAD}time,{BASILISK}\n{rows(TIMES, mrp(), omegas())}"),
     "Basilisk from 1": ("csv", lambda: f"{HEAD}time,{BASILISK_1}\n{rows(TIMES, mrp(), omegas())}"),
@@ -406,6 +449,8 @@ def test_rows_of_one_time_are_one_where_they_agree_to_the_digits_printed(tmp_pat
         ("t,quatA,quatB,quatC,quatD", "looks like an attitude"),
         ("t,a_w,a_x,a_y,a_z,b_w,b_x,b_y,b_z", "Several columns are quaternions"),
         ("t,qpos[3],qpos[4],qpos[5],qpos[6]", "is not declared"),
+        ("t,b.Q[1],b.Q[2],b.Q[3],b.Q[4]", "'b.Q[1]' looks like an attitude"),
+        ("t,y[0],y[1],y[2],y[3]", "'y[0]' and 'y[1]' name no quantity"),
         ("t,rx,ry,rz,n", "# attitude: rotation vector"),
         ("t,angular rate 1,angular rate 2,angular rate 3,n", "looks like an angular velocity"),
         ("t,gx,gy,gz,n", "Ω of a gyroscope, or γ"),
@@ -473,7 +518,9 @@ def test_instants_of_a_calendar_are_times_over_a_leap_second(tmp_path: Path) -> 
     lines = [f"2016-12-31 23:59:{s}Z,{row}" for s, row in zip(stamps, rows(quaternions()).splitlines(), strict=True)]
     path, names = tmp_path / "log.csv", "timestamp,qw,qx,qy,qz\n"
     assert digits(path, HEAD + names + "\n".join(lines)) > 13
-    lines[3] = lines[3].replace("Z", "+02:00")
+    lines[2:] = [line.replace("2016-12-31 23", "2017-01-01 00").replace("Z", "+01:00") for line in lines[2:]]
+    assert digits(path, HEAD + names + "\n".join(lines)) > 13
+    lines[3] = lines[3].replace("+01:00", "+1h")
     assert "is not an epoch" in refusal(path, HEAD + names + "\n".join(lines))
 
 

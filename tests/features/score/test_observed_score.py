@@ -317,9 +317,6 @@ def test_a_convention_of_no_column_is_reported(tmp_path: Path) -> None:
     for key, value in unused.items():
         file.write_text("".join(f"# {key}: {value}\n" for key, value in (keys | {key: value}).items()) + table)
         assert f"ignored keys: {key}" in read(file).warnings()
-    file.write_text("# link: arm\n" + table)
-    with pytest.raises(InputError, match="link was given without file"):
-        read(file)
 
 
 def test_the_gamma_of_a_start_is_normalized_where_asked() -> None:

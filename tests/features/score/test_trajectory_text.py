@@ -214,6 +214,7 @@ def test_a_body_is_compared_with_a_case_at_its_own_scale(size: Fraction, changed
         (table() + "1,2\n", "Line 7 has 2 columns, not 7"),
         (table() + "2,1,1,1,0,0,1\n", "Lines 6 and 7 have the same time and differ"),
         (table() + "3,1,1,1,0,0,abc\n", "Line 7, gamma3: 'abc' is not a finite number"),
+        (table() + "3,1,1,1,0,0,\n", "Line 7, gamma3: '' is not a finite number"),
         ("# centre: 0, 0, 0,5\n" + table(), "centre must be 3 numbers; got '0, 0, 0,5'"),
         ("# inertia: 2,5;2,5;1,5\n" + table(), "inertia must be 3 numbers; got '2,5;2,5;1,5'"),
         (HEADER + "\n" + "1,2,3,4,5,6,7\n" * 300_000, "300001 lines are too many.*"),
@@ -289,7 +290,7 @@ def test_what_is_of_another_quantity_is_left_out() -> None:
 @pytest.mark.parametrize(
     ("header", "said"),
     [
-        ("t [d];omega1;omega2;omega3;gamma1;gamma2;gamma3", "t in d"),
+        ("t [weeks];omega1;omega2;omega3;gamma1;gamma2;gamma3", "t in weeks"),
         ("t [s];omega1/(gon/s);omega2/(gon/s);omega3/(gon/s);gamma1;gamma2;gamma3", "omega in gon/s"),
         ("t [s];omega1 [rad/s];omega2 [1/s];omega[3];gamma1;gamma2;gamma3", ""),
     ],

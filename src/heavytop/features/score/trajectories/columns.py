@@ -17,6 +17,7 @@ from heavytop.display import plural
 from heavytop.errors import InputError, prefixed, quoted, require_as_many
 from heavytop.exact.flint.balls import midpoint, working_precision
 from heavytop.features.score.trajectories.logs import (
+    NAMES,
     ORDERS,
     canonical,
     of_rodrigues,
@@ -75,6 +76,7 @@ _SECOND = {
     **dict.fromkeys(("ns", "nsec", "nanoseconds"), Fraction(1, 10**9)),
     **dict.fromkeys(("min", "minutes"), Fraction(60)),
     **dict.fromkeys(("h", "hr", "hours"), Fraction(3600)),
+    **dict.fromkeys(("d", "day", "days"), Fraction(86400)),
 }
 _ANGLE = dict.fromkeys(("deg", "degree", "degrees", "°"), Fraction(1, 180))
 _TURN = dict.fromkeys(("rev", "r", "turn", "turns"), Fraction(2))
@@ -88,7 +90,8 @@ _RATE = {
     **{"dps": Fraction(1, 180), "rpm": Fraction(1, 30), "rps": Fraction(2), "hz": Fraction(2)},
     **{f"mrad{second}": Fraction(1, 1000) for second in _A_SECOND},
 }
-_METRE = {"mm": Fraction(1, 10**3), "cm": Fraction(1, 100)}
+_METRE = {"mm": Fraction(1, 10**3), "cm": Fraction(1, 100), "km": Fraction(1000)}
+_METRE |= {"in": Fraction(254, 10**4), "ft": Fraction(3048, 10**4)}
 _LENGTHS = ("m", *_METRE)
 _OMEGA = ("omega", "omega_space", "framed")
 _UNITS = {"t": _SECOND, **dict.fromkeys(_OMEGA, _RATE), "position": _METRE, "rotation_vector": _ANGLE}
@@ -184,6 +187,8 @@ def header(names: Sequence[str], joint: str = "") -> Header:
 
 
 def _twice(column: str, one: str, other: str) -> InputError:
+    if len({re.sub(r"[\[(]\d+[\])]", "", name) for name in (one, other)}) == 1 and one != other:  # y[0] and y[1]
+        return InputError(f"The columns {quoted(one)} and {quoted(other)} name no quantity.", NAMES)
     both = "" if one == other else f", as {quoted(one.strip())} and {quoted(other.strip())}"
     return InputError(f"The column {column} occurs twice{both}.", "Keep one of them.")
 
@@ -334,7 +339,7 @@ def _words(quantity: str) -> str:
 def cell(text: str, where: str) -> Fraction | None:
     """An exact number; None for NaN and infinities; InputError that names the place for everything else."""
     if not text.strip():
-        raise InputError(f"{where} is empty.", "Give every row all columns.")
+        raise InputError(f"{where} is empty.", "Give every row all columns, and nan for a missing number.")
     return written_numbers.number(text, where)
 
 

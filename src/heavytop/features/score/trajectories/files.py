@@ -53,8 +53,8 @@ _COMMENT = ("#", "%", "!", "//")
 _REMARK = re.compile(r"((?<!1\.)#|#(?!inf|ind|qnan|snan)).*", re.IGNORECASE)
 """Remarks after the numbers of a line; an older C library writes infinity and NaN as 1.#INF and 1.#QNAN."""
 _STARTS = ("gamma", "start_quaternion", "start_matrix", "start_euler")
-_COMMA = re.compile(r",(?![^\[]*\])")
-"""A comma, but for one in brackets, as in R[0,1]."""
+_COMMA = re.compile(r",(?![^\[(]*[\])])")
+"""A comma, but for one in brackets, as in R[0,1] or R(1,1)."""
 _ALL_COLUMNS = "Give every row all of its columns, with decimal points, not commas."
 _COUNTS = {"inertia": (3, 6, 9), "start_quaternion": (4,), "start_matrix": (9,)}
 """Counts of numbers of keys that are not vectors."""
@@ -235,7 +235,7 @@ def _cells(line: str, separator: str | None) -> list[str]:
     if separator is None and any(mark in line for mark in ";,\t"):
         separator = _separator(line)
     line = _REMARK.sub("", line).rstrip()
-    cells = _COMMA.split(line) if separator == "," and "[" in line else line.split(separator)
+    cells = _COMMA.split(line) if separator == "," else line.split(separator)
     # a separator behind the last column is not a column
     if separator and len(cells) > 1 and not cells[-1].strip():
         cells = cells[:-1]
@@ -270,6 +270,7 @@ def _split(body: list[str], lines: list[int], separator: str | None, width: int)
     for number, line in zip(lines, body, strict=True):
         spaced = separator is None and _DECIMAL_COMMAS.match(line)
         cells = _cells(line.replace(",", ".") if spaced else line, separator)
+        cells += [""] * (len(cells) == width - 1 and line.endswith(separator or "\0"))
         if len(cells) != width:
             decimal_commas = separator == "," and len(cells) == 2 * width
             remedy = "For decimal commas, separate the columns by semicolons." if decimal_commas else _ALL_COLUMNS
@@ -486,6 +487,7 @@ def _observed(document: dict[str, Any], stem: str, case: Case | None, normalize:
     else:
         raw = observed_columns.start(document, table, not times[0], said, not body.weight)
     words = [word for word in observed_columns.unused(said, {*table.values, raw.form}) if word in document]
+    words += ["link"] if "link" in document and "file" not in document else []  # of ROS
     words += ["frame"] if observed_columns.in_space(document) and "omega_space" not in table.values else []
     notes += (f"ignored keys: {', '.join(words)}",) if words else ()
     precision = _precision(document, table.texts)
@@ -535,8 +537,6 @@ def _about(document: dict[str, Any], stem: str, case: Case | None, broken: bool)
 
 def _body(document: dict[str, Any], case: Case | None) -> AnyBody:
     """The body of a file of a robot, a body with its mass, or a top by its weight."""
-    if "link" in document and "file" not in document:
-        raise InputError("link was given without file.", "Give the file of the link.")
     if "file" in document:
         return body_of({key: document[key] for key in ("file", "link", *BODY) if key in document})
     keys = [key for key in ("mass", "gravity") if key in document]

@@ -55,7 +55,8 @@ _ALIASES = tuple(
         (r"sigma_BN[\[_(]?([0-3])[\])]?", "sigma{}"),
         (r"omega_BN_B[\[_(]?([0-3])[\])]?", "omega{}"),
         (r"(?<!_)quat(?:ernion)?[\[(]([0-4])[\])]", "quat{}"),
-        (r"(?<!_)(?:omega|ang_?vel|angular_?velocity|w_a)[\[(]([0-3])[\])]", "omega{}"),  # w_a of Modelica
+        # w_a of Modelica
+        (r"(?<!_)(?:omega|ang_?vel|angular_?velocity|w_a)(?:[\[(]([0-3])[\])]|\.([xyz]))", "omega{}"),
     )
 )
 _JOINTS = {"free": (3, 3), "ball": (0, 0)}
@@ -63,7 +64,7 @@ _JOINTS = {"free": (3, 3), "ball": (0, 0)}
 _INDEX = re.compile(r"(qpos|qvel)[\[_(]?(\d+)[\])]?", re.IGNORECASE)
 _DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
 _LOOKS = {
-    "an attitude": re.compile(r"quat|orient|attitude|(^|[^a-z])att[^a-z]|rodrigues|euler|dcm", re.IGNORECASE),
+    "an attitude": re.compile(r"quat|orient|attitude|(^|[^a-z])att[^a-z]|[._]q[\[(]\d|rodrigues|euler|dcm", re.I),
     "an angular velocity": re.compile(r"omega|ang(ular)?[ _.-]?(vel|rate)|gyro|body[ _.-]?rate", re.IGNORECASE),
 }
 _GIVES = {
@@ -157,15 +158,16 @@ def with_one_time(
             if whole is not None and part is not None:
                 row[seconds] = decimal_text(whole + part / 10**9, 40)
             del row[nano]
+        names = [re.sub(r"^timestamp\b", "epoch", name) for name in names]  # of the log, not of the message
         names[seconds] = "timestamp [s]"
         del names[nano]
     plain = [canonical(name) for name in names]
-    words = [name.partition(" ")[0] for name in plain]
+    words = [name.partition(" ")[0].lower() for name in plain]
     for place, word in enumerate(words):
-        if word.lower() in _COUNTED and _INSTANT.match(cells[0][place]):
+        if word in _COUNTED and _INSTANT.match(cells[0][place]):
             for row in cells:
                 row[place] = decimal_text(_epoch(row[place].replace(" ", "T")), 40)
-        if word.lower() in _COUNTED:
+        if word in _COUNTED:
             for row in cells:
                 row[place] = row[place].removesuffix(" sec")  # of a timetable of MATLAB
     index = next((index for word in _COUNTED for index in _places(word, words, cells)), None)
@@ -197,7 +199,8 @@ def _places(word: str, words: Sequence[str], cells: Sequence[Sequence[str]]) -> 
         return []
     index = words.index(word)
     first, last = (number(row[index]) or 0 for row in (cells[0], cells[-1]))
-    return [index] if word in _EPOCHS or (_OF_1970[0] < first < _OF_1970[1] and last - first < first / 1000) else []
+    since_1970 = any(_OF_1970[0] < first / size < _OF_1970[1] for size in (1, 10**3, 10**6, 10**9))
+    return [index] if word in _EPOCHS or (since_1970 and last - first < first / 1000) else []
 
 
 def _kept(stamps: Sequence[str]) -> str:
@@ -313,7 +316,10 @@ def without_preamble(text: str) -> str:
             for kind, what, axis in columns
         )
     elif "endheader" in lines:
-        end = lines.index("endheader") + 1
+        end = lines.index("endheader")
+        if "inDegrees=yes" in lines[:end] and "# angles" not in text:
+            lines[end] = "# angles: degrees"
+        end += 1
     else:
         return text
     return "\n".join([*(line if line.startswith("#") else f"# | {line}" for line in lines[:end]), *lines[end:]])
@@ -380,11 +386,13 @@ _LEAPS += [(year, 7) for year in (1972, 1981, 1982, 1983, 1985, 1992, 1993, 1994
 
 def _epoch(text: str, system: str = "UTC") -> Fraction:
     """Seconds of an epoch, calendar date or day of the year, exactly; in UTC with the leap seconds before it."""
-    whole, _, part = re.sub(r"Z|\+00:00", "", text).partition(".")
+    clock, zone = re.fullmatch(r"(.*?)(Z|[+-]\d\d:\d\d)?", text).groups("Z")  # type: ignore[union-attr]
+    whole, _, part = clock.partition(".")
     is_leap = system == "UTC" and whole.endswith(":59:60")
     for pattern in ("%Y-%m-%dT%H:%M:%S", "%Y-%jT%H:%M:%S"):
         try:
-            moment = datetime.strptime(whole[:-2] + "59" if is_leap else whole, pattern).replace(tzinfo=UTC)
+            second = whole[:-2] + "59" if is_leap else whole
+            moment = datetime.strptime(second + zone, f"{pattern}%z").astimezone(UTC)
             fraction = Fraction(int(part or 0), 10 ** len(part))
         except ValueError:
             continue
