@@ -126,11 +126,11 @@ def events(
         setup = Setup.of(body, state, form, arguments.system(system, body))
         named_one, axes = named(integrator), None if setup.frame is None else setup.frame.axes
         end, limits = _until(until), (arguments.tolerance(tolerance, form), arguments.steps(step_limit))
-        if which.rational:
-            own = which if axes is None else in_body_axes(which, axes)
-            first_term(own, setup.system, setup.system.parameters(setup.top, setup.start), setup.start.flat)
+        own = which if axes is None else in_body_axes(which, axes)
+        exact = setup.system.parameters(setup.top, setup.start), setup.start.flat
+        order = first_term(own, setup.system, *exact)[0] if which.rational else 0
         run = dense(named_one, setup.problem, end, *limits)
-        return locate(run, str(named_one), wanted, axes)
+        return locate(run, str(named_one), wanted, axes, order)
     if (precision, integrator, tolerance, step_limit) != (DOUBLE, "heyoka", None, None):
         raise InputError(
             "Proven events (digits) do not support precision, integrator, tolerance or step_limit.",

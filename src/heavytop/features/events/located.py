@@ -58,9 +58,10 @@ class Found(NamedTuple):
     discontinuity: str = ""
 
 
-def locate(run: Dense, integrator: str, wanted: Wanted, axes: Axes | None = None) -> Events:
+def locate(run: Dense, integrator: str, wanted: Wanted, axes: Axes | None = None, order: int = 0) -> Events:
     """The events of a run, up to its ``until``.
 
+    order: of the zero of a rational function at the exact start, 0 where it has none there.
     axes: the rows of A where the function is of v_given = A v, and the states are wanted in these axes; None for those
     of the run.
     Raises InputError where a callable raises, or gives no finite number.
@@ -69,7 +70,7 @@ def locate(run: Dense, integrator: str, wanted: Wanted, axes: Axes | None = None
     inner = function if axes is None else in_body_axes(function, axes)
     found_in = _watched(run, wanted.reached)
     events = (
-        _of_rational(inner, found_in, precision)
+        _of_rational(inner, found_in, precision, order)
         if function.rational
         else _of_callable(_Sampler(function, precision, axes), found_in)
     )
@@ -133,8 +134,12 @@ def _native_time(time: Fraction, precision: Precision) -> Any:
         return number(Fraction(0), precision)
 
 
-def _of_rational(function: EventFunction, pieces: Iterator[Piece], precision: Precision) -> Iterator[Found]:
-    """Changes of sign of the numerator where the denominator is not 0."""
+def _of_rational(function: EventFunction, pieces: Iterator[Piece], precision: Precision, order: int) -> Iterator[Found]:
+    """Changes of sign of the numerator where the denominator is not 0.
+
+    order: of its zero at the exact start.  Rounding the start scatters such a zero, which is no event; up to
+    t = eps^(1/(order + 1)) of a step the function is below a rounding.
+    """
     terms, below = terms_of(function.numerator), terms_of(function.denominator)
     used, zero = function.used(), fmpq_poly([0])
     before, floats = 0, _as_floats(terms)
@@ -145,6 +150,8 @@ def _of_rational(function: EventFunction, pieces: Iterator[Piece], precision: Pr
         polynomial = composed(terms, components, zero).numer()
         bits = precision.bits + _GUARD_BITS + (precision.bits if piece.began == 0 else 0)
         changes = [(refined(polynomial, c, bits), c.rising) for c in sign_changes(polynomial, piece.end, bits)]
+        if order and piece.began == 0:
+            changes = [change for change in changes if change[0] > fmpq(1, 1 << precision.bits // (order + 1))]
         after = sign_after(polynomial)
         if before and after and before != after:
             # the two steps disagree at their common end by a rounding
