@@ -13,7 +13,7 @@ import pytest
 
 from heavytop import extras
 from heavytop.errors import MissingExtra
-from support.helpers import python
+from support.helpers import python, without_progress
 from support.in_process import HERE
 from without_extras import CORE, MOTION, NEEDS, says_so, without
 
@@ -30,7 +30,8 @@ def test_the_extras_are_those_of_the_project() -> None:
 def test_a_command_that_lacks_its_extra_says_so_and_the_core_goes_on(names: tuple[str, ...], tmp_path: Path) -> None:
     lacking = [(name, command) for name in names for command in NEEDS[name]]
     core = [CORE[0], CORE[-1]]
-    ends = without([*names], [*(command for _, command in lacking), *core], tmp_path)
+    commands = [*(command for _, command in lacking), *core]
+    ends = [(code, without_progress(errors)) for code, errors in without([*names], commands, tmp_path)]
     for (name, command), end in zip(lacking, ends[: len(lacking)], strict=True):
         assert says_so(name, *end), (command, end)
     assert ends[len(lacking) :] == [(0, "")] * len(core)

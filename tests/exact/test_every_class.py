@@ -123,5 +123,5 @@ def test_the_attitude_has_no_exceptional_state_but_those_without_azimuth(name: s
             motion.attitude(Fraction(1), 100)
         return
     assert_attitude(motion, Fraction(0), Fraction(7, 3), Fraction(-40))
-    _, attitude = attitude_of(motion, Fraction(0), 200)
-    assert_overlap(attitude(Fraction(0), 200), initial_xi(motion.start.gamma))
+    _, attitude = attitude_of(motion, Fraction(0), 100)
+    assert_overlap(attitude(Fraction(0), 100), initial_xi(motion.start.gamma))

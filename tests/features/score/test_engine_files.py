@@ -114,7 +114,8 @@ IN_FILE = [
      {"vector": "γ"}),
     ("omega_in_degrees", FINE, Log(QUATERNION, keys={"omega": engine_files.text(np.degrees(FINE.omega))}),
      {"of": "start"}),
-    ("time_unit", FINE, Log(("position",), times=lambda steps, h: [1000 * n * h for n in steps]), {"factor": "0.001"}),
+    ("time_unit", replace(FINE, every=10),  # a reference of a thousand times its horizon is computed
+     Log(("position",), times=lambda steps, h: [1000 * n * h for n in steps]), {"factor": "0.001"}),
     ("one_state", FINE, Log(QUATERNION, spoil=last_turned), {"state": "12 of 12"}),
     ("column_scaled", FINE, of_columns(lambda q: q * [1, 1, -1, 1], *QUATERNION),
      {"column": "y of the quaternion", "factor": "−1"}),
