@@ -196,9 +196,9 @@ def cluster() -> Iterator[str]:
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     once = os.environ | {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1"}
     start = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", port]
-    join = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard"]
-    processes = [subprocess.Popen([*start, "--no-dashboard"], env=once, **quiet)]
-    processes += [subprocess.Popen(join, **quiet) for _ in range(2)]
+    join = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--nworkers", "2", "--nthreads", "1"]
+    commands = ([*start, "--no-dashboard"], once), ([*join, "--no-dashboard"], None)
+    processes = [subprocess.Popen(line, env=environment, **quiet) for line, environment in commands]
     try:
         yield address
     finally:
