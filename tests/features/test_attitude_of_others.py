@@ -46,7 +46,7 @@ def plain(top, start, times, precision, *, system):
     return propagate(top, start, times, precision, system=system)
 '''
 PLAN = """name = "theirs"
-integrators = ["mine.py:solve", "mine.py:plain"]
+integrators = ["mine.py:{function}"]
 [[measure]]
 kind = "drift"
 cases = ["bruels-cardona-arnold", "gyrostat", "heavy-gyrostat"]

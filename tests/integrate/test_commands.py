@@ -229,6 +229,25 @@ def test_one_process_serves_many_requests_and_the_next_row_begins_with_an_empty_
     assert texts[0] == texts[1]
 
 
+@pytest.mark.parametrize(
+    ("arguments", "options", "cause"),
+    [
+        (("mine", 4, print, "stepp"), {}, 'control must be "tolerance" or "step"; got \'stepp\''),
+        (("mine", -1, print), {}, "order must be 0 or more; got -1"),
+        (("mine", 4.5, print), {}, "order must be an integer"),
+        ((5, 4, print), {}, "name must be text"),
+        (("mine", 4, print), {"one_step": "no"}, "one_step must be a bool; got 'no'"),
+        (("mine", 4, print), {"directions": ["up"]}, "directions must be forward or backward; got 'up'"),
+        (("mine", 4, print), {"systems": ["moon"]}, "Unknown system 'moon'"),
+        (("mine", 4, print), {"precisions": ["doubel"]}, "Unknown precision 'doubel'"),
+        (("mine", 4, print), {"systems": []}, "systems is empty"),
+    ],
+)
+def test_what_a_callable_declares_is_read(arguments, options, cause: str) -> None:
+    with pytest.raises(InputError, match=cause):
+        double_peer(*arguments, **options)
+
+
 def test_what_a_program_declares_that_it_cannot_do_is_never_sent() -> None:
     forward = program("dies at the start", directions=("forward",), precisions=("double", "real:BITS"))
     integrate = registry.ready(forward)

@@ -153,10 +153,13 @@ def test_two_reports_without_a_common_row_say_so() -> None:
     assert "no row in common" in said[-1]
 
 
-@pytest.mark.parametrize(("last", "between"), [("1e-12", True), ("1e-7", False)])
-def test_a_last_state_that_is_as_it_was_points_to_the_dense_output(last: str, between: bool) -> None:
-    old = rk5(metrics={DIGITS: error("1e-12"), "solution_error_omega_final": error("1e-12")})
-    new = replace(old, metrics={DIGITS: error("1e-6"), "solution_error_omega_final": error(last)})
+@pytest.mark.parametrize(
+    ("last", "drift", "between"), [("1e-12", "1e-6", True), ("1e-7", "1e-6", False), ("1e-12", "1e-12", False)]
+)
+def test_a_last_state_that_is_as_it_was_points_to_the_dense_output(last: str, drift: str, between: bool) -> None:
+    names = (DIGITS, "solution_error_omega_final", "drift_energy_max")
+    old = rk5(metrics={name: error("1e-12") for name in names})
+    new = replace(old, metrics=dict(zip(names, map(error, ("1e-6", last, drift)), strict=True)))
     assert ("errors are between steps" in found([old], [new])[0]) is between
     given = [
         replace(each, key=replace(each.key, subject=replace(each.key.subject, what="given"))) for each in (old, new)

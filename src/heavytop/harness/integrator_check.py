@@ -12,7 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, partial
-from math import ceil, log
+from math import ceil, inf, log
 from typing import Any, Literal, NamedTuple
 
 import msgspec
@@ -207,9 +207,9 @@ class _Contract:
         if self.program and "real:BITS" in self.program.precisions:
             self.precisions = [*(self.precisions if names else []), real(237)]
         self.precision = self.precisions[0]
-        self.systems = [name for name in (self.program.systems if self.program else systems) if _case(name)]
+        self.systems = [name for name in (self.program.systems if self.program else systems) if name in _CASES]
         self.backward_only = bool(self.program) and "forward" not in (self.program.directions if self.program else ())
-        case = CASES[_case(self.systems[0])] if self.systems else CASES["generic"]
+        case = CASES[_CASES[self.systems[0]] if self.systems else "generic"]
         self.top, self.start, self.system = case.top, case.start, case.system
 
     @cached_property
@@ -241,7 +241,7 @@ class _Contract:
             ("attitude", self._attitude),
             *((f"format {p.name}", partial(self._plain, f" in {p.name}", precision=p)) for p in self.precisions[1:]),
             *(
-                (f"system {name}", partial(self._plain, f" of the {name}", case=CASES[_case(name)]))
+                (f"system {name}", partial(self._plain, f" of the {name}", case=CASES[_CASES[name]]))
                 for name in self.systems[1:]
             ),
         ]
@@ -462,13 +462,13 @@ class _Contract:
             raise  # a new process takes the line: another request ended the last one
         return "Unknown lines are ignored."
 
-    def _answer(self, request: ProgramRequest) -> list[list[Any]]:
+    def _answer(self, request: ProgramRequest, seconds: float = inf) -> list[list[Any]]:
         """The states with which the program answers; raises PeerFailed also where it says that it failed."""
         assert self.program is not None
         with session(self.program) as program:
-            reply = program.ask(request)
+            reply = program.ask(request, seconds)
         if reply.failure:
-            raise PeerFailed(reply.failure)
+            raise PeerFailed(f"{self.program.name} failed: {reply.failure}", answered=True)
         return [list(state) for state in reply.states]
 
     def _two_at_once(self) -> str:
@@ -500,7 +500,9 @@ class _Contract:
             if self.program is None:
                 self._run([1], start, top, system=HEAVY_TOP)
             else:
-                self._ask(self.program, Problem.of(top, start, self.precision, HEAVY_TOP), _HUGE_SECONDS)
+                problem, time = Problem.of(top, start, self.precision, HEAVY_TOP), -1 if self.backward_only else 1
+                self.declared.require(self.program.name, start, HEAVY_TOP, Fraction(time), self.precision, None)
+                self._answer(self.program.request(problem, [Fraction(time)], self._default()), _HUGE_SECONDS)
         except Unsupported:
             raise
         except (_Violated, PeerFailed, InputError) as error:
@@ -508,15 +510,6 @@ class _Contract:
                 raise PeerFailed(f"{_HUGE_REQUEST}: {error.cause}") from None
             raise _Note(f"{_HUGE_REQUEST}: no finite state ({_cause(error)}).") from None
         return f"{_HUGE_REQUEST}: finite states."
-
-    def _ask(self, command: Command, problem: Problem, seconds: float) -> None:
-        """Raises PeerFailed where it returns no state at t = 1 within ``seconds``."""
-        time = Fraction(-1 if self.backward_only else 1)
-        command.declared.require(command.name, problem.start, problem.system, time, self.precision, None)
-        with session(command) as program:
-            reply = program.ask(command.request(problem, [time], self._default()), seconds)
-        if reply.failure:
-            raise PeerFailed(f"{command.name} failed: {reply.failure}", answered=True)
 
     def _ended_by(self, text: bytes, trigger: str) -> str:
         assert self.program is not None
@@ -559,11 +552,6 @@ class _Extended(ProgramRequest):
 
     def text(self, label: int) -> bytes:
         return super().text(label).replace(b"\ngo\n", b"\nunknown-to-version-1 1 2 3\ngo\n")
-
-
-def _case(system: str) -> str:
-    """The case for checking a system; "" for an unknown one."""
-    return _CASES.get(system, "")
 
 
 def _distance(state: Sequence[Any], other: Sequence[Any]) -> Fraction:

@@ -32,8 +32,6 @@ _BASE = 30.0
 """Seconds granted to every row, for a loaded machine."""
 _COST_FACTOR = 10.0
 """Factor of the expected seconds, granted in addition."""
-_LEAST = 10.0
-"""Smallest limit, in seconds, of an integrator that repeatedly runs out of time."""
 _MOST_OUT_OF_TIME = 2
 """Rows in which an integrator may run out of time before its other rows are skipped."""
 _MOST_DEATHS = 3
@@ -43,10 +41,10 @@ _LOOKAHEAD = 64
 
 @dataclass(slots=True)
 class _Record:
-    """Per integrator: the largest ratio of seconds to cost; rows that ran out of time, in succession and in all."""
+    """Per integrator: the largest ratio of seconds to cost; the part of the next limit; rows that ran out of time."""
 
     ratio: float = 1.0
-    in_succession: int = 0
+    part: float = 1.0
     out_of_time: int = 0
 
 
@@ -55,8 +53,8 @@ class RowLimits:
     """Seconds that a row of a third-party integrator may take.
 
     30 s plus ten times the expected cost: that of heyoka for the same row, times the largest ratio, 1 or more, of
-    seconds to cost among the integrator's finished rows.  After 1, 2, ... rows in succession that ran out of time the
-    next limit is divided by 2, 3, ..., down to 10 s; after two such rows in all the others are skipped.
+    seconds to cost among the integrator's finished rows.  After a row that ran out of time the next limit is halved;
+    after two such rows the others are skipped.
     fixed: a limit for every row in place of this.
     """
 
@@ -68,17 +66,17 @@ class RowLimits:
         if self.fixed is not None:
             return self.fixed
         record = self._records[task.key.subject.name]
-        return max((_BASE + _COST_FACTOR * cost * record.ratio) / (1 + record.in_succession), _LEAST)
+        return record.part * (_BASE + _COST_FACTOR * cost * record.ratio)
 
     def finished(self, task: Task, cost: float, seconds: float) -> None:
         """Records a row that finished."""
         record = self._records[task.key.subject.name]
-        record.in_succession, record.ratio = 0, max(record.ratio, seconds / cost)
+        record.part, record.ratio = 1.0, max(record.ratio, seconds / cost)
 
     def ran_out(self, task: Task) -> None:
         """Records a row that was stopped at its limit."""
         record = self._records[task.key.subject.name]
-        record.in_succession, record.out_of_time = record.in_succession + 1, record.out_of_time + 1
+        record.part, record.out_of_time = 0.5, record.out_of_time + 1
 
     def not_asked(self, waiting: deque[int], tasks: Sequence[Task]) -> Iterator[tuple[int, Row]]:
         """Removes the waiting tasks of integrators that ran out of time twice, and yields their rows."""

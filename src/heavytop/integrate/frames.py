@@ -37,26 +37,14 @@ def in_frame(values: NDArray[numpy.float64], frame: Frame, precision: Precision)
     if not len(values):
         return values
     rotated = numpy.array(values, copy=True)
-    is_integral = [[entry.denominator == 1 for entry in row] for row in frame.axes]
     for begin in range(0, rotated.shape[1], 3):
         part = values[:, begin : begin + 3]
-        if all(map(all, is_integral)):
-            rotated[:, begin : begin + 3] = _permuted(part, frame)
-        elif precision == DOUBLE:
+        if precision == DOUBLE:
             rotated[:, begin : begin + 3] = _in_double(part.astype(float), frame)
         else:
             lines = [_rotated_exactly(line, frame, precision) for line in part]
             rotated[:, begin : begin + 3] = numpy.array(lines, dtype=rotated.dtype)
     return rotated
-
-
-def _permuted(part: NDArray[numpy.float64], frame: Frame) -> Any:
-    """The components permuted, with signs."""
-    columns = []
-    for row in frame.axes:
-        axis = next(i for i in range(3) if row[i])
-        columns.append(part[:, axis] if row[axis] > 0 else -part[:, axis])
-    return numpy.stack(columns, axis=1)
 
 
 def _rotated_exactly(line: Sequence[Any], frame: Frame, precision: Precision) -> list[Any]:

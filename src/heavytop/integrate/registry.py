@@ -49,12 +49,11 @@ from heavytop.precision import (
     cache_last_call,
     exact,
     log10,
-    parse,
     physical,
     six_digits,
 )
 from heavytop.records import INTEGRATORS as FORMER
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, SYSTEMS, System, square_of_rate, system
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, SYSTEMS, System, square_of_rate
 from heavytop.top.heavy_top import DoubleTimes, HeavyTop, State
 
 GROUP = "heavytop.peers"
@@ -444,16 +443,7 @@ def _require_possible(command: Command) -> None:
         raise InputError(f"timeout = {quoted(command.timeout)} is not above 0 and up to {_MOST_SECONDS} seconds.")
     if command.order < 0:
         raise InputError(f"order must not be negative; got {command.order}.")
-    for name, values in (("systems", command.declared.systems), ("directions", command.directions)):
-        if not values:
-            raise InputError(f"{name} is empty.")
-    for item in command.systems:
-        system(item)
-    for item in command.precisions:
-        if item != "real:BITS":
-            parse(item)
-    if not command.precisions:
-        raise InputError("precisions is empty.")
+    _ = command.declared  # raises for impossible capabilities
 
 
 def seconds_of(value: Any, what: str) -> float:

@@ -8,7 +8,6 @@ from fractions import Fraction
 from pathlib import Path
 
 from heavytop.display import plural
-from heavytop.errors import InputError, quoted
 from heavytop.features.hunt.measured import Family
 from heavytop.features.hunt.search import Hunted, HuntRequest, command_of, hunt, keep, kept
 from heavytop.harness.checkpoint import Saved
@@ -25,7 +24,6 @@ from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
 NAME = "hunt"
 WORST = Quantity("hunt_error", "relative_to_law", "max")
 MEDIAN = Quantity("hunt_error", "random_tops", "median")
-_MOST = 1_000_000
 
 
 class HuntTable(PlanTable, tag=NAME):
@@ -47,14 +45,6 @@ class HuntTable(PlanTable, tag=NAME):
     def tasks(self, find: Find) -> list[Task]:
         """One task."""
         (horizon,) = positive([self.horizon], "horizon")
-        if not 1 <= self.budget <= _MOST:
-            raise InputError(f"budget must be from 1 to {_MOST} motions; got {self.budget}.", "Change the budget.")
-        if self.limit and exact(self.limit) <= 0:
-            raise InputError(f"limit must be positive; got {quoted(self.limit)}.", "Give a positive number.")
-        if self.against == self.integrator:
-            raise InputError("integrator and against must differ.", "Give another one, or leave out against.")
-        if self.found:
-            kept(Path(self.found))
         name = f"{self.family}-{self.seed}"
         system = HEAVY_GYROSTAT.name if self.family == HEAVY_GYROSTAT.name else HEAVY_TOP.name
         key = RowKey(NAME, name, system, computed(self.integrator), parse(self.precision).name)
@@ -65,7 +55,9 @@ class HuntTable(PlanTable, tag=NAME):
             "limit": exact_text(exact(self.limit)) if self.limit else "",
             "found": self.found,
         }
-        return [Task(key, "", self.integrator, options=self, request=request)]
+        task = Task(key, "", self.integrator, options=self, request=request)
+        _request(task)  # raises for impossible settings
+        return [task]
 
 
 class HuntKind(Kind):

@@ -164,13 +164,6 @@ class Dice:
         """1 to 9.9 times a power of ten from 10^least to 10^most."""
         return Fraction(10 + self.below(90), 10) * Fraction(10) ** (least + self.below(most - least + 1))
 
-    def direction(self) -> Vector:
-        """A rational unit vector, uniform on the sphere but for rounding."""
-        while True:
-            p, q, r = (self.part() for _ in range(3))
-            if 0 < p * p + q * q + r * r <= 1:
-                return unit((p, q, r))
-
 
 def unit(values: Sequence[Fraction]) -> Vector:
     """A rational point of the unit sphere within 2^-58 of the direction of ``values``, which are not all 0."""
@@ -306,14 +299,6 @@ def _scaled(motion: Motion, dice: Dice) -> Motion:
     return with_data(top, inertia, top.weight * mass / length, centre, rotor_times=mass), start
 
 
-def _faster(motion: Motion, dice: Dice) -> Motion:
-    """Another pace on the same path: Ω times s, the weight times s²."""
-    top, start = motion
-    pace = dice.power(-6, 1)
-    omega = [pace * value for value in start.omega]
-    return with_data(top, weight=top.weight * pace**2, rotor_times=pace), State(omega, start.gamma)
-
-
 def _poled(motion: Motion, dice: Dice) -> Motion:
     """γ along an axis of the body, or near it."""
     top, start = motion
@@ -358,28 +343,6 @@ def _nudged(motion: Motion, dice: Dice) -> Motion:
     return with_data(top, perturbed(top.inertia), weight, perturbed(top.centre)), State(perturbed(start.omega), gamma)
 
 
-def _without(motion: Motion, dice: Dice) -> Motion:
-    """A component of the centre or of Ω set to 0, or its sign changed."""
-    top, start = motion
-    centre, omega = list(top.centre), list(start.omega)
-    dice.pick([centre, omega])[dice.below(3)] *= dice.pick([0, -1])
-    return with_data(top, centre=centre), State(omega, start.gamma)
-
-
-def _permuted(motion: Motion, dice: Dice) -> Motion:
-    """The axes of the body, or of the start, permuted cyclically."""
-    top, start = motion
-    shift = 1 + dice.below(2)
-
-    def cycled(values: Vector) -> list[Fraction]:
-        return [values[(i + shift) % 3] for i in range(3)]
-
-    if dice.below(2):
-        rotor = None if top.rotor is None else cycled(top.rotor)
-        return HeavyTop(cycled(top.inertia), top.weight, cycled(top.centre), rotor), start
-    return top, State(cycled(start.omega), cycled(start.gamma))
-
-
 def _rotored(motion: Motion, dice: Dice) -> Motion:
     """A rotor with random components, down to 0."""
     top, start = motion
@@ -402,10 +365,10 @@ def with_data(
 
 Change = Callable[[Motion, Dice], Motion]
 _DRAWS: tuple[Change, ...] = (
-    _simple, _edge, _equal, _spun, _slow, _weighed, _scaled, _faster, _poled, _balanced, _balanced, _pendulum,
+    _simple, _edge, _equal, _spun, _slow, _weighed, _scaled, _poled, _balanced, _balanced, _pendulum,
 )  # fmt: skip
 _CHANGES: tuple[Change, ...] = (
-    _edge, _equal, _spun, _slow, _weighed, _scaled, _faster, _poled, _balanced, _nudged, _nudged, _without, _permuted,
+    _edge, _equal, _spun, _slow, _weighed, _scaled, _poled, _balanced, _nudged, _nudged,
 )  # fmt: skip
 
 

@@ -17,9 +17,10 @@ import msgspec
 from flint import arb
 
 from heavytop.cases import Case
-from heavytop.errors import InputError, invalid
+from heavytop.errors import InputError, invalid, refusal
 from heavytop.exact.flint.balls import rational, whole_evaluation, working_precision
 from heavytop.features.hunt.measured import (
+    FAMILIES,
     Dice,
     Family,
     IntegratedRun,
@@ -36,11 +37,11 @@ from heavytop.features.hunt.measured import (
 from heavytop.files import replace
 from heavytop.harness.case_text import forms, rerun
 from heavytop.harness.plan import Top, document_of
-from heavytop.integrate.registry import Integrator, described
+from heavytop.integrate.registry import Integrator, described, require
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.scalar import GUARD_BITS, largest, to_ball
 from heavytop.measure.truth import Truth, truth
-from heavytop.precision import Precision, decimal_text, shown
+from heavytop.precision import DOUBLE_DOUBLE, Precision, decimal_text, shown
 from heavytop.records import HEYOKA, MULTIWORD, OUT_OF_TIME
 from heavytop.top.amplification import rate
 from heavytop.top.equations import GYROSTAT, system_of
@@ -145,13 +146,6 @@ def _simpler_data(places: Sequence[int], motion: Motion) -> Iterator[Motion]:
                 yield HeavyTop(inertia, changed[3], changed[4:7], changed[10:] or None), State(omega, start.gamma)
 
 
-def _without_rotor(motion: Motion) -> Iterator[Motion]:
-    """The body with a rotor at rest."""
-    top, start = motion
-    if top.rotor is not None:
-        yield with_data(top, rotor_times=0), start
-
-
 def _near_directions(motion: Motion) -> Iterator[Motion]:
     """Starts with γ at rational points of the unit sphere, each nearer than all of smaller denominators."""
     top, start = motion
@@ -189,7 +183,6 @@ _CHANGES: tuple[Callable[[Motion], Iterator[Motion]], ...] = (
     _near_directions,
     partial(_simpler_data, range(3)),
     *(partial(_simpler_data, [place]) for place in range(3, 10)),
-    _without_rotor,
     partial(_simpler_data, range(10, 13)),
 )
 
@@ -253,6 +246,7 @@ FIRST = 64
 DECADES = 100.0
 """An error that is so many times what law and amplification explain is a finding."""
 _POOL = 24
+_MOST, _MOST_SEED = 1_000_000, 10**9
 _MOST_FOUND = 3
 _MOST_HITS = 16
 _SHOWN = 3
@@ -269,7 +263,7 @@ Advance = Callable[[int, int], None]
 
 @dataclass(frozen=True, slots=True)
 class HuntRequest:
-    """The settings of a search.
+    """The settings of a search; raises InputError for impossible ones.
 
     budget: motions, or None for ``seconds`` of processor time.  limit: in eps T^1.5, or the ratio to ``against``; None
     for two decades beyond what is explained.  first: motions that are measured before all others.
@@ -286,6 +280,24 @@ class HuntRequest:
     seed: int = 1
     first: tuple[Motion, ...] = ()
 
+    def __post_init__(self) -> None:
+        rules = {
+            "family": (self.family, self.family in FAMILIES, f"one of {', '.join(FAMILIES)}"),
+            "horizon": (self.horizon, self.horizon != 0, "a time other than 0"),
+            "budget": (self.budget, self.budget is None or 1 <= self.budget <= _MOST, f"from 1 to {_MOST} motions"),
+            "limit": (self.limit, self.limit is None or self.limit > 0, "positive"),
+            "seed": (self.seed, 0 <= self.seed <= _MOST_SEED, f"from 0 to {_MOST_SEED}"),
+        }
+        for name, (value, holds, rule) in rules.items():
+            if not holds:
+                raise refusal(name, rule, value, f"Correct {name}.")
+        if self.integrator.name == HEYOKA and self.precision == DOUBLE_DOUBLE:
+            raise InputError("heyoka does not support double-double.", "Use multiword, or another format.")
+        if self.against == self.integrator:
+            raise InputError("integrator and against must differ.", "Give another one, or leave out against.")
+        if self.against is not None:
+            require(self.against)
+
     @property
     def unit(self) -> float:
         """eps T^1.5."""
@@ -296,7 +308,7 @@ class HuntRequest:
         """The integrator shown with it: heyoka, or multiword where heyoka is hunted or lacks the format."""
         if self.against is not None:
             return self.against
-        no_heyoka = self.integrator.name == HEYOKA or self.precision.name == "double-double"
+        no_heyoka = self.integrator.name == HEYOKA or self.precision == DOUBLE_DOUBLE
         return described(MULTIWORD if no_heyoka else HEYOKA)
 
 

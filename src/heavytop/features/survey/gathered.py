@@ -52,13 +52,8 @@ def chunk_bytes(columns: dict[str, Any]) -> bytes:
     """A Parquet file of one row group; NaN becomes null."""
     import pyarrow
 
-    schema, arrays = _schema(), []
-    for field in schema:
-        values = columns[field.name]
-        if field.name in _TEXTS:
-            arrays.append(pyarrow.array(values, pyarrow.string()).dictionary_encode())
-        else:
-            arrays.append(pyarrow.array(values, field.type, from_pandas=True))
+    schema = _schema()
+    arrays = [pyarrow.array(columns[field.name], field.type, from_pandas=True) for field in schema]
     stream = io.BytesIO()
     with _writer(stream, schema) as writer:
         writer.write_table(pyarrow.Table.from_arrays(arrays, schema=schema))

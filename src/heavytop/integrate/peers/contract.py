@@ -26,12 +26,24 @@ from typing import Any, Literal
 
 import numpy
 
-from heavytop.errors import HeavyTopError, InputError, PeerFailed, Unsupported, refusal
+from heavytop.errors import HeavyTopError, InputError, PeerFailed, Unsupported, quoted, refusal
 from heavytop.guard import stopwatch
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.precision import DOUBLE, Precision, Vector, cross, decimal_text, dot, exact, number, rounded, six_digits
+from heavytop.precision import (
+    DOUBLE,
+    Precision,
+    Vector,
+    cross,
+    decimal_text,
+    dot,
+    exact,
+    number,
+    parse,
+    rounded,
+    six_digits,
+)
 from heavytop.top.attitude import near_quaternion, perpendicular, rotation_of, rows_of
-from heavytop.top.equations import HEAVY_TOP, NAMES, System
+from heavytop.top.equations import HEAVY_TOP, NAMES, System, system
 from heavytop.top.heavy_top import HeavyTop, State
 
 _MOST_SAID = 200
@@ -160,6 +172,17 @@ class Declared:
     singular_at: tuple[Vector, ...] = ()
 
     def __post_init__(self) -> None:
+        for name in ("systems", "directions", "precisions"):
+            if getattr(self, name) == ():
+                raise InputError(f"{name} is empty.", "List at least one.")
+        for item in self.systems or ():
+            system(item)
+        for item in self.directions or ():
+            if item not in ("forward", "backward"):
+                raise refusal("directions", "forward or backward", quoted(item), "Correct it.")
+        for item in self.precisions or ():
+            if item != "real:BITS":
+                parse(item)
         if not all(map(any, self.singular_at)):
             raise InputError("A γ in singular_at must not be zero.", "Give γ, such as 0, 0, 1.")
 

@@ -14,6 +14,7 @@ from typing import Any, Literal
 import numpy
 
 from heavytop import precision as vectors
+from heavytop.arguments import flag, text
 from heavytop.display import plural
 from heavytop.errors import InputError, PeerFailed, Unsupported, quoted, refusal
 from heavytop.integrate.peers.contract import (
@@ -26,7 +27,7 @@ from heavytop.integrate.peers.contract import (
 )
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.multiword.codegen.machine_code import Doubles
-from heavytop.precision import DOUBLE, OncePerArguments, Precision, exact, number
+from heavytop.precision import DOUBLE, OncePerArguments, Precision, as_integer, exact, number
 from heavytop.top.attitude import matrix_of_quaternion
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State, check_times
@@ -147,8 +148,15 @@ def double_peer(
         InputError for a format other than double, for times out of order and for a control out of range.
 
     Raises:
-        InputError: for declarations that are not lists of text.
+        InputError: for a name, an order, a control or a declaration that none can have.
     """
+    if control not in ("tolerance", "step"):
+        raise refusal("control", '"tolerance" or "step"', quoted(control), "Give one of these.")
+    if as_integer(order, "order") < 0:
+        raise refusal("order", "0 or more", order, "Give 0 where there is none to declare.")
+    text(name, "name")
+    for option, value in (("one_step", one_step), ("fixed_grid", fixed_grid)):
+        flag(value, option)
     singular = tuple(vectors.vector(point, "singular_at") for point in singular_at)
     if attitude not in (False, True, "quaternion"):
         raise refusal("attitude", 'True, False or "quaternion"', quoted(attitude), "Give one of these.")

@@ -18,7 +18,7 @@ import msgspec
 from heavytop.display import plural
 from heavytop.integrate.registry import is_third_party
 from heavytop.measure.scalar import digits_kept, digits_text
-from heavytop.measure.scorer import ERRORS, OBSERVED_ORDER, ORDER_OF_RUNS, SOLUTION_ERROR
+from heavytop.measure.scorer import DRIFT, ERRORS, OBSERVED_ORDER, ORDER_OF_RUNS, SOLUTION_ERROR
 from heavytop.records import FAILED, NOT_ASKED, UNMEASURED, UNSUPPORTED, Identity, Law, Metric, Quantity, Row, Series
 from heavytop.report.compare.rows import Finding
 from heavytop.report.compare.verdicts import Verdict
@@ -517,13 +517,16 @@ def _steps_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sen
 
 
 def _ends_as_before(change: Change) -> bool:
-    """Whether the error of the last state of a computed row did not grow; False for files, whose steps are unknown."""
+    """Whether of a computed row a drift grew, but not the error of the last state; False for files, whose steps are
+    unknown.  An error of the pace, without drift, may decrease towards the end: near a saddle.
+    """
     if change.old is None or change.old.key.subject.what != "computed":
         return False
-    measured = ((name, metric.quantity) for name, metric in change.old.metrics.items())
-    finals = [name for name, q in measured if q and q.name in _DIGITS and q.statistic == "final"]
-    moved = [change.decades(name) for name in finals]
-    return bool(moved) and all(error is not None and error < _ENDS_AS_BEFORE for error in moved)
+    measured = [(change.decades(name), m.quantity) for name, m in change.old.metrics.items() if m.quantity]
+    finals = [moved for moved, q in measured if q.name in _DIGITS and q.statistic == "final"]
+    drifts = (moved for moved, q in measured if q.name == DRIFT and moved is not None)
+    at_end = all(moved is not None and moved < _ENDS_AS_BEFORE for moved in finals)
+    return bool(finals) and at_end and max(drifts, default=0.0) >= _ENDS_AS_BEFORE
 
 
 def _laws_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:
