@@ -820,7 +820,7 @@ def _prim(name: str, values: Mapping[str, str], units: Mapping[str, Fraction]) -
     a, b, c, d, e, f = (value * scale for value in _in_axes(turn, six))
     x, y, z = (value * length for value in numbers.three(values.get("centerOfMass"), "centerOfMass", "0 0 0"))
     mass = numbers.one(values["mass"], "mass") * kilogram
-    free = values.get("disableGravity", "0").lower() in ("1", "true")
+    free = values.get("disableGravity", "0").lower() in ("1", "1.0", "true")
     earth = -EARTH[2] / length  # also where the scene has -inf
     gravity = (Fraction(0), Fraction(0), Fraction(0) if free else -units.get("gravityMagnitude", earth) * length)
     return BodyInFile(name, mass, (x, y, z), (a, b, c, d, e, f), slack * scale, gravity=gravity)

@@ -180,6 +180,17 @@ def test_positions_in_the_unit_of_the_header_are_those_of_the_data(
     assert found.digits_right > 15
 
 
+def test_where_positions_begin_proves_no_reading_of_them() -> None:
+    """The centre is reversed, but not Steiner's term: mirrored axes explain the first positions, not how they move."""
+    start = ht.State(("1.95", "-2.01", "-0.75"), attitude=ht.Attitude.quaternion(1, -7, -5, 4, normalize=True))
+    central = ("0.93", "0.91", "0.82", "-0.03", "0.03", "0.02")
+    given = ht.Body(2, "9.81", ("0.39", "0.16", "-0.25"), central, "centre of mass")
+    other = ht.Body(2, "9.81", ("0.39", "-0.16", "-0.25"), given.tensor, "pivot")
+    times = [f"{k}/20" for k in range(1, 41)]
+    positions = ht.propagate(other, start, times).positions()
+    assert ht.score(times, top=given, start=start, positions=positions).diagnosis == ()
+
+
 def test_a_sleeping_top_is_right_in_any_columns(tmp_path: Path) -> None:
     assert scored(lines(), tmp_path).digits_right > 13.5
     turned = lines(header="t,x,y,z", rows="1,0,0,1\n2,0,0,1")

@@ -111,6 +111,14 @@ class ConventionSearch(Search):
         if self.reaches and diagnosis is None and error > _TWO_MISTAKES and _forms(self.samples) & set(FORMS):
             yield from map(self._tried, _pairs(self.samples))
 
+    def counted(self, error: float, looked: int) -> float:
+        """Of the first positions, where nothing else is given, as far as they move: many readings explain the first."""
+        most = super().counted(error, looked)
+        if looked == len(self.file_errors) or self.samples.columns.keys() != {"position"}:
+            return most
+        moved = numpy.ptp(self.samples.columns["position"][:looked], axis=0).max()
+        return min(most, float(moved / (numpy.linalg.norm(self.samples.point) or 1.0)))
+
     def of_start(self) -> Diagnosis | None:
         """Another start, tried last: its six numbers also fit a motion that is only early or late."""
         error = float(self.file_errors.max())

@@ -112,6 +112,10 @@ class Search(ABC):
     def further(self, diagnosis: Diagnosis | None, error: float) -> Iterator[Hypothesis]:
         """Hypotheses that are tried only where nothing, or nothing better than this, explains the error."""
 
+    def counted(self, error: float, looked: int) -> float:
+        """The part of an error of so many first samples whose fall counts."""
+        return min(error, _LARGE)
+
     @cached_property
     def tried(self) -> list[Hypothesis]:
         """All hypotheses, with the errors that they leave."""
@@ -143,7 +147,7 @@ class Search(ABC):
         looked = len(self.file_errors) if looked is None else looked
         lefts = [(hypothesis, hypothesis.left(looked)) for hypothesis in tried]
         lefts = [pair for pair in lefts if pair[1] <= _NOTHING]
-        most = min(error, _LARGE)
+        most = self.counted(error, looked)
         explained = [(hypothesis, left) for hypothesis, left in lefts if left * hypothesis.least_fall(drop) <= most]
         if not explained:
             return None

@@ -129,18 +129,11 @@ class Header:
     units: Mapping[str, Unit] = field(default_factory=dict)
     unknown: tuple[str, ...] = ()
 
-    def of_state(self) -> dict[str, int]:
-        """The indices of t, omega1 to omega3, gamma1 to gamma3 that are present; InputError for one given twice."""
-        indices = {} if self.time is None else {"t": self.time}
-        for quantity, name in (("omega", "omega"), ("framed", "omega"), ("gamma", "gamma")):
-            components = self.places.get(quantity, {})
-            if {"0", "3"} <= set(components):
-                raise InputError(f"The header has both {name}0 and {name}3.", "Number from 1 to 3, or from 0 to 2.")
-            for component, index in components.items():
-                axis = _AXES.get(component) or str(int(component) + ("0" in components))
-                if indices.setdefault(f"{name}{axis}", index) != index:
-                    raise InputError(f"The column {name}{axis} occurs twice.", "Give each column once.")
-        return indices
+    @property
+    def missing(self) -> list[str]:
+        """What a table of states needs and has not: t, Ω, γ."""
+        given = {"t": self.time is not None, "Ω": {"omega", "framed"} & self.places.keys(), "γ": "gamma" in self.places}
+        return [name for name, there in given.items() if not there]
 
 
 def header(names: Sequence[str], joint: str = "") -> Header:
@@ -382,7 +375,7 @@ class ColumnTable:
 
 def is_observed(document: Mapping[str, Any]) -> bool:
     """Whether a document has other keys or columns than those of states in principal axes."""
-    return "header" in document or any(document.get(key) is not None for key in KEYS)
+    return not document.get("plain", True) or any(document.get(key) is not None for key in KEYS)
 
 
 def convention(document: Mapping[str, Any], header: Header | None = None) -> Convention:
@@ -573,18 +566,10 @@ def _of_lists(document: Mapping[str, Any], convention: Convention) -> ColumnTabl
     for name in WIDTHS:
         if name in columns:
             key, rows = columns[name]
-            values[name] = [_complete(cell_of(v, f"{key}[{i}]") for v in row) for i, row in enumerate(rows)]
+            named = ((f"{key}[{i}]", row) for i, row in enumerate(rows))
+            values[name] = [_complete(written_numbers.number(v, where) for v in row) for where, row in named]
     texts = [str(value) for _, rows in columns.values() for row in rows for value in row]
     return ColumnTable(values, texts, [f"row {i + 1}" for i in range(max(counts.values(), default=0))])
-
-
-def cell_of(value: Any, where: str) -> Fraction | None:
-    """The exact number of a value of JSON, as :func:`cell`."""
-    if value is None:
-        raise InputError(f"{where} has an empty cell.", "Give every row all columns.")
-    if not isinstance(value, str):
-        raise InputError(f"{where} must contain numbers; got a {type(value).__name__}.", _REMEDY)
-    return cell(value, where)
 
 
 def _is_table(value: object, name: str) -> bool:
@@ -600,7 +585,7 @@ def _flat(row: Any, width: int, what: str) -> list[Any]:
         row = [value for part in row for value in part]
     if not isinstance(row, list) or len(row) != width:
         has = plural(len(row), "number") if isinstance(row, list) else "no list"
-        raise InputError(f"{what} has {has}, not {width}.", "Give every row all columns.")
+        raise InputError(f"{what} has {has}, not {width}.", f"Give {width} numbers.")
     return row
 
 
@@ -653,9 +638,8 @@ def start(
 
 def _omega(document: Mapping[str, Any], first: Mapping[str, tuple[Fraction, ...] | None]) -> tuple[Vector, bool]:
     """Ω at t = 0, and whether it is in the axes of space."""
-    rates = [
-        key for key in ("omega", "omega_space") if document.get(key) is not None and not _is_table(document[key], key)
-    ]
+    given = (key for key in ("omega", "omega_space") if document.get(key) is not None)
+    rates = [key for key in given if key not in _ARRAYS or not _is_table(document[key], key)]
     if len(rates) > 1:
         raise InputError("omega and omega_space both give Ω at t = 0.", "Give one of them.")
     if rates:
@@ -685,9 +669,10 @@ def _attitude(value: object, name: str, key: str, convention: Convention) -> tup
 
 def times(document: Mapping[str, Any]) -> list[Fraction]:
     """The column t of a text table; raises InputError that names the line of what is not a finite number."""
-    instants, unit = [], document["header"].units.get("t")
-    for number, text in zip(document["lines"], document["times"], strict=True):
-        value = cell(text, f"Line {number}, column t")
+    header, instants = document["header"], []
+    unit = header.units.get("t")
+    for number, row in zip(document["lines"], document["cells"], strict=True):
+        value = cell(text := row[header.time], f"Line {number}, column t")
         if value is None:
             raise InputError(f"Line {number}, column t: {text.strip()} is not a finite number.", _REMEDY)
         instants.append(value if unit is None else unit.size * value)

@@ -37,7 +37,7 @@ from heavytop.features.score.trajectories.observed import (
 )
 from heavytop.files import read_whole, readable, without_repeats
 from heavytop.integrate.trajectory import Outcome
-from heavytop.measure.attitude_error import WIDTHS
+from heavytop.measure.attitude_error import WIDTHS, Convention
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, Vector, exact_text, parse, real, shown, six_digits
 from heavytop.top.attitude import SHAPES, key_of
 from heavytop.top.bodies import BODY, CENTRE, Body, body_of
@@ -118,22 +118,15 @@ def read_table(text: str, started: bool = False) -> tuple[dict[str, Any], list[s
     notes += [f"as the header declares, {', '.join(in_units)}"] if in_units else []
     if meaning.unknown:
         notes.append(f"unknown units in the header, not converted: {', '.join(sorted(meaning.unknown))}")
-    columns: dict[str, Any]
-    if meaning.time is not None and (meaning.units or observed_columns.is_more_than_states(meaning)):
-        unused = [*meaning.others, *(names[place] for place in _parts(meaning))]
-        times_written = [row[meaning.time] for row in cells]
-        columns = {"times": times_written, "header": meaning, "cells": cells, "lines": lines}
-    else:
-        places = meaning.of_state()
-        if meaning.time is None and observed_columns.is_more_than_states(meaning):
-            raise InputError("No column holds the times.", "Call it t, or t [ms] for milliseconds.")
-        if missing := [name for name in COLUMNS if name not in places]:
-            raise _no_header(missing, names)
-        unused = [name for index, name in enumerate(names) if index not in places.values()]
-        states = [[row[places[name]] for name in VARIABLES] for row in cells]
-        columns = {"times": [row[places["t"]] for row in cells], "states": states}
-        columns["numbers"] = [f"Line {number}" for number in lines]
-    return keys | columns | {"cut": cut}, notes + unread(unused, names)
+    more = observed_columns.is_more_than_states(meaning)
+    if more and meaning.time is None:
+        raise InputError("No column holds the times.", "Call it t, or t [ms] for milliseconds.")
+    plain = not more and not meaning.units
+    if plain and meaning.missing:
+        raise _no_header(meaning.missing, names)
+    columns = {"header": meaning, "plain": plain, "cells": cells, "lines": lines, "cut": cut}
+    unused = [*meaning.others, *(names[place] for place in _parts(meaning))]
+    return keys | columns, notes + unread(unused, names)
 
 
 def _lines(text: str) -> tuple[dict[str, str | list[str]], list[list[str]], list[int], list[str]]:
@@ -259,9 +252,7 @@ def _is_header(names: list[str], width: int) -> bool:
     except InputError:  # of a sentence, unless these are as many as the columns
         return len(names) == width
     has_time = header.time is not None or names[:1] == ["%time"]
-    return len(header.of_state()) == len(COLUMNS) or (
-        has_time and bool(header.places) and (not header.others or len(names) == width > 2)
-    )
+    return not header.missing or (has_time and bool(header.places) and (not header.others or len(names) == width > 2))
 
 
 def _split(body: list[str], lines: list[int], separator: str | None, width: int) -> list[list[str]]:
@@ -438,28 +429,28 @@ def _json(text: str) -> dict[str, Any]:
 def _given(document: dict[str, Any], stem: str, case: Case | None, normalize: bool) -> GivenTrajectory:
     if isinstance(document.get("times"), list) and len(document["times"]) > MOST_STATES:
         raise too_many(len(document["times"]))
-    top, times, rows = _top(document, case), _times(document), _list(document, "states")
-    require_states(times, rows)
-    texts = [_list({"state": row}, "state", 6) for row in rows]
-    values = [
-        [written_numbers.number(text, f"{row}, {name}") for text, name in zip(state, VARIABLES, strict=True)]
-        for state, row in zip(texts, _places(document, len(rows)), strict=True)
-    ]
-    first = [value for value in values[0] if value is not None]
-    at_start = State(first[:3], first[3:]) if not times[0] and len(first) == 6 else None
-    start = _start(document, case, at_start)
+    top, times = _top(document, case), _times(document)
+    table = observed_columns.columns(document, Convention())
+    require_states(times, table.places)
+    values = [*zip(table.values["omega"], table.values["gamma"], strict=True)]
+    (omega, gamma), at_start = values[0], None
+    if not times[0] and omega and gamma:
+        at_start = State(omega, gamma)
+    if case is not None:
+        document = {key: [*map(exact_text, getattr(case.start, key))] for key in ("omega", "gamma")} | document
+    raw = observed_columns.start(document, table, not times[0], Convention())
+    start = State(raw.omega, raw.values)
     which = system_of(_system(document, case), top)
     if case is not None:
         require_case(case, top, start, which, at_start)
     require_physical(top, start)
-    precision = _precision(document, [str(value) for row in texts for value in row])
-    from_row = at_start is not None and start == at_start
-    slack = slack_of_start(from_row and "gamma" not in document, precision)
+    precision = _precision(document, table.texts)
+    slack = slack_of_start(raw.from_row, precision)
     if normalize:
         start = start.normalized()
     start.require_unit_gamma(slack, "Write all its digits, or use --normalize (normalize=True in Python).")
     which.parameters(top, start)
-    states = [rounded_state(state, precision) for state in values]
+    states = [rounded_state([*w, *g], precision) if w and g else None for w, g in values]
     about = _about(document, stem, case, None in states)
     return GivenTrajectory(top=top, start=start, system=which, precision=precision, times=times, states=states, **about)
 
@@ -503,18 +494,11 @@ def _times(document: dict[str, Any]) -> list[Fraction]:
     if "lines" in document:
         texts = observed_columns.times(document)
     else:
-        written = _list(document, "times")
-        rows = zip(written, _places(document, len(written)), strict=True)
-        texts = [written_numbers.finite(time, f"{row}, t") for time, row in rows]
+        texts = [written_numbers.finite(time, f"Row {i}, t") for i, time in enumerate(_list(document, "times"), 1)]
     times = list(check_times(texts))
     if not any(times):
         raise InputError("No time other than 0 was given.", "Give states at later times.")
     return times
-
-
-def _places(document: dict[str, Any], count: int) -> list[str]:
-    """The place of each state in messages: its line in a table, its row in JSON."""
-    return document.get("numbers") or [f"Row {number}" for number in range(1, count + 1)]
 
 
 def _about(document: dict[str, Any], stem: str, case: Case | None, broken: bool) -> dict[str, Any]:
@@ -561,7 +545,10 @@ def _body(document: dict[str, Any], case: Case | None) -> AnyBody:
 
 def _top(document: dict[str, Any], case: Case | None) -> HeavyTop:
     """The top of the file, with the data of the case where the file has none."""
-    inertia, centre = (_vector(document, key, case) for key in ("inertia", "centre"))
+    inertia, centre = (
+        list(getattr(case.top, key)) if case and key not in document else _list(document, key, 3)
+        for key in ("inertia", "centre")
+    )
     weight = _text(document, "weight", None if case is None else exact_text(case.top.weight))
     rotor = _list(document, "rotor", 3) if "rotor" in document else None if case is None else case.top.rotor
     return HeavyTop(inertia, weight, centre, rotor)
@@ -570,26 +557,6 @@ def _top(document: dict[str, Any], case: Case | None) -> HeavyTop:
 def _system(document: dict[str, Any], case: Case | None) -> str | None:
     """The name of the system: the file's, else that of the case; None where neither says it."""
     return _text(document, "system") if "system" in document else None if case is None else case.system.name
-
-
-def _start(document: dict[str, Any], case: Case | None, at_start: State | None) -> State:
-    """The start of the file, else that of the case, else its row t = 0."""
-    if case is None and at_start is not None and not {"omega", "gamma"} & document.keys():
-        return at_start
-    if case is None and not {"omega", "gamma"} <= document.keys():
-        missing = "omega" if "omega" not in document else "gamma"
-        raise InputError(
-            f"The key {missing} is missing, and there is no row t = 0.",
-            "Give omega and gamma at t = 0, or the row t = 0, or --case NAME.",
-        )
-    return State(*(_vector(document, key, case) for key in ("omega", "gamma")))
-
-
-def _vector(document: dict[str, Any], key: str, case: Case | None) -> list[Any]:
-    if case is not None and key not in document:
-        owner = case.top if key in ("inertia", "centre") else case.start
-        return list(getattr(owner, key))
-    return _list(document, key, 3)
 
 
 def _list(document: dict[str, Any], key: str, count: int | None = None) -> list[Any]:
