@@ -104,6 +104,8 @@ def test_the_asymptotic_case_tends_to_its_saddle_at_its_rate() -> None:
         (f"{MEASURE}[[measure]]\nkind='local_error'\ncases=['euler']\nhorizon='1'\nprecisions=[]", "measures nothing"),
         (f"{MEASURE}integrator = 'a'\n{PROGRAMS}", "integrators that it does not measure: b, c."),
         ("[[measure]]\nkind = 'hunt'\nagainst = 'heyoka'", "integrator and against must differ"),
+        ("[[measure]]\nkind = 'hunt'\nseed = -1", "seed must be from 0 to 1000000000; got -1"),
+        ("[[measure]]\nkind = 'hunt'\nagainst = 'nobody'", "Unknown integrator 'nobody'"),
         (MEASURE.replace("euler", "oiler"), "Unknown case 'oiler'.   Did you mean euler?"),
         (MEASURE.replace("double", "float"), "Unknown precision 'float'"),
         (MEASURE.replace("10", "-10"), "positive"),

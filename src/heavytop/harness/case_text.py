@@ -120,14 +120,11 @@ def _python(data: dict[str, Any]) -> str:
     weight = number(data["weight"])
     system = "" if _is_default_system(data) else f', system="{data["system"]}"'
     rotor = f", rotor={numbers('rotor')}" if "rotor" in data else ""
-    return "\n".join(
-        [
-            "import heavytop as ht",
-            "",
-            f"top = ht.HeavyTop(inertia={numbers('inertia')}, weight={weight}, centre={numbers('centre')}{rotor})",
-            f"start = ht.State(omega={numbers('omega')}, gamma={numbers('gamma')})",
-            f"run = ht.propagate(top, start, [{', '.join(_TIMES)}], ht.DOUBLE{system})",
-        ]
+    return (
+        "import heavytop as ht\n\n"
+        f"top = ht.HeavyTop(inertia={numbers('inertia')}, weight={weight}, centre={numbers('centre')}{rotor})\n"
+        f"start = ht.State(omega={numbers('omega')}, gamma={numbers('gamma')})\n"
+        f"run = ht.propagate(top, start, [{', '.join(_TIMES)}], ht.DOUBLE{system})"
     )
 
 
@@ -137,15 +134,12 @@ def _python_of_body(case: Case) -> str:
     parts = [spin, ("gamma", start.gamma)] if start.attitude is None else [spin]
     vectors = [f"{name}=({', '.join(repr(exact_text(value)) for value in vector)})" for name, vector in parts]
     attitude = [] if start.attitude is None else [f"attitude=ht.{start.attitude!r}"]
-    return "\n".join(
-        [
-            "import heavytop as ht",
-            "",
-            f"body = ht.{case.body!r}",
-            f"start = ht.State({', '.join(vectors + attitude)})",
-            f"run = ht.propagate(body, start, [{', '.join(_TIMES)}], ht.DOUBLE)",
-            "run.quaternions(), run.positions()",
-        ]
+    return (
+        "import heavytop as ht\n\n"
+        f"body = ht.{case.body!r}\n"
+        f"start = ht.State({', '.join(vectors + attitude)})\n"
+        f"run = ht.propagate(body, start, [{', '.join(_TIMES)}], ht.DOUBLE)\n"
+        "run.quaternions(), run.positions()"
     )
 
 

@@ -187,15 +187,9 @@ class Checkpoint:
         self._open.close()
 
     def _unlock(self) -> None:
-        lock_file = self.directory / ".lock"
-        try:
-            # removed while the lock is held: a process that waits for this file notices that it was replaced
-            lock_file.unlink(missing_ok=True)
-            self._lock.release()
-        except PermissionError:  # Windows: an open file cannot be removed
-            self._lock.release()
-            with suppress(OSError):
-                lock_file.unlink()
+        with suppress(OSError):  # while it is held: a process that waits for this file notices that it was replaced
+            (self.directory / ".lock").unlink()
+        self._lock.release()
         with suppress(OSError):  # only an empty folder is removed
             self.directory.rmdir()
 

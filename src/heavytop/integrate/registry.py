@@ -517,14 +517,11 @@ def ready(which: str | IntegratorSource, control: tuple[str, Fraction] | None = 
     options: dict[str, Any] = dict([control] if control else [])
     if control is not None or not own:
         with contained(name, " when its arguments were looked at"):
-            arguments = inspect.signature(chosen).parameters
-            takes_any = any(argument.kind is argument.VAR_KEYWORD for argument in arguments.values())
+            arguments = _names.__wrapped__(chosen)
         for option in options:
-            if option not in arguments and not takes_any and own:
-                raise no_option(name, option)
-            if option not in arguments and not takes_any:
-                raise PeerFailed(f"{name} does not support {option}")
-        if "step_limit" in arguments and not own:
+            if arguments is not None and option not in arguments:
+                raise no_option(name, option) if own else PeerFailed(f"{name} does not support {option}")
+        if not own and "step_limit" in inspect.signature(chosen).parameters:
             options["step_limit"] = STEP_LIMIT
     return CheckedPlugin(name, chosen, own, declared, options)
 

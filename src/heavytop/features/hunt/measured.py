@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -223,14 +223,9 @@ def possible(motion: Motion, family: Family, horizon: Fraction) -> Motion | None
     if max(sizes) > _LARGEST or min(sizes) * _LARGEST < 1:
         return None
     rounded = HeavyTop(inertia, weight, centre, rotor), State(omega, start.gamma)
-    return rounded if turns(rounded, horizon) <= MOST_TURNS else None
-
-
-def turns(motion: Motion, horizon: Fraction) -> float:
-    """rate T: the rate of the start, rounded up to a power of 2, times the horizon."""
-    top, start = motion
-    system = system_of(None, top)
-    return float(rate(system, system.parameters(top, start), start.flat) * abs(horizon))
+    system = system_of(None, rounded[0])
+    turns = rate(system, system.parameters(*rounded), rounded[1].flat) * abs(horizon)
+    return rounded if turns <= MOST_TURNS else None
 
 
 def _shortened(value: Fraction) -> Fraction:
@@ -550,59 +545,40 @@ def class_of(top: HeavyTop, start: State) -> str:
 def special(motion: MeasuredMotion) -> list[str]:
     """Sentences on moments, spin, equilibrium, separatrix, energy and amplification, where these are special."""
     top, start = motion.motion
-    return [*_moments(top), *_start(top, start), *_amplification(motion)]
-
-
-def _moments(top: HeavyTop) -> list[str]:
-    sentences = []
-    for i, j in ((0, 1), (1, 2), (0, 2)):
-        a, b = sorted((top.inertia[i], top.inertia[j]), reverse=True)
-        ratio = round(a / b)
-        excess = float(a / b / ratio - 1)
-        if ratio <= 3 and abs(excess) < _NEAR * 20:
-            names = (i, j) if top.inertia[i] == a else (j, i)
-            difference = "" if excess == 0 else f" to within {abs(excess):.1g}"
-            sentences.append(f"I{names[0] + 1}/I{names[1] + 1} = {ratio}{difference}")
-    slack = float((sum(top.inertia) - 2 * max(top.inertia)) / max(top.inertia))
-    if slack < _NEAR * 20:
-        sentences.append("at the edge of the triangle inequality" + (f", {slack:.1g} from it" if slack else ""))
-    stiff = float(max(top.inertia) / min(top.inertia))
-    if stiff > _FAST:
-        sentences.append(f"moments of very different size, 1 : {stiff:.3g}")
-    return sentences
-
-
-def _start(top: HeavyTop, start: State) -> list[str]:
     system = system_of(None, top)
-    parameters = system.parameters(top, start)
-    pull = dot(top.moment, top.moment)
-    spin = math.sqrt(dot(start.omega, start.omega))
-    swing = math.sqrt(math.sqrt(pull) / float(min(top.inertia)))
-    sentences = []
-    if spin == 0 or swing == 0:
-        sentences.append("Ω = 0" if spin == 0 else "no gravitational torque")
-    elif spin > _FAST * swing:
-        sentences.append(f"spin rate {spin / swing:.3g} times the pendulum rate")
-    elif swing > _FAST * spin:
-        sentences.append(f"slow: Ω is {spin / swing:.2g} of the pendulum rate")
-    field = [abs(value) for value in system.field(parameters.mapped(Fraction), start.flat)]
-    unit = spin + swing or 1.0
+    field = [abs(value) for value in system.field(system.parameters(top, start).mapped(Fraction), start.flat)]
+    slack, stiff = float(sum(top.inertia) / max(top.inertia) - 2), float(max(top.inertia) / min(top.inertia))
+    height, spin = (math.sqrt(dot(vector, vector)) for vector in (top.moment, start.omega))
+    swing = math.sqrt(height / float(min(top.inertia)))
+    unit, part = spin + swing or 1.0, spin / (swing or 1.0)
     speed = max(float(max(field[:3])) / unit**2, float(max(field[3:])) / unit)
-    if not any(field):
-        sentences.append("an equilibrium")
-    elif speed < _NEAR:
-        sentences.append(f"near an equilibrium: the field is {speed:.1g} of its bound")
-    energy = dot(top.angular_momentum(start.omega), start.omega) / 2 + dot(top.moment, start.gamma)
-    height = math.sqrt(pull)
-    if height and abs(float(energy) / height - 1) < _NEAR:
-        sentences.append("near a separatrix: its energy is that of the upright equilibrium")
-    return [*sentences, f"energy {float(energy):.4g}, P|r| = {height:.4g}"]
-
-
-def _amplification(motion: MeasuredMotion) -> list[str]:
+    energy = float(dot(top.angular_momentum(start.omega), start.omega) / 2 + dot(top.moment, start.gamma))
     chaotic = motion.amplification > 100 * (1 + motion.turns)
     kind = ", more than a regular motion does: near a separatrix, or chaotic" if chaotic else ""
-    sentences = [f"rate T at most {motion.turns:.3g}"]
-    if digits_eaten(motion.amplification) >= _FEW or chaotic:
-        sentences.append(f"the motion itself amplifies by {motion.amplification:.2g}{kind}")
-    return sentences
+    facts = {
+        "at the edge of the triangle inequality" + (f", {slack:.1g} from it" if slack else ""): slack < _NEAR * 20,
+        f"moments of very different size, 1 : {stiff:.3g}": stiff > _FAST,
+        "Ω = 0": not spin,
+        "no gravitational torque": spin and not swing,
+        f"spin rate {part:.3g} times the pendulum rate": 0 < _FAST * swing < spin,
+        f"slow: Ω is {part:.2g} of the pendulum rate": 0 < _FAST * spin < swing,
+        "an equilibrium": not any(field),
+        f"near an equilibrium: the field is {speed:.1g} of its bound": any(field) and speed < _NEAR,
+        "near a separatrix: its energy is that of the upright equilibrium": abs(energy - height) < _NEAR * height,
+        f"energy {energy:.4g}, P|r| = {height:.4g}": True,
+        f"rate T at most {motion.turns:.3g}": True,
+        f"the motion itself amplifies by {motion.amplification:.2g}{kind}": chaotic
+        or digits_eaten(motion.amplification) >= _FEW,
+    }
+    return [*_ratios(top), *(text for text, holds in facts.items() if holds)]
+
+
+def _ratios(top: HeavyTop) -> Iterator[str]:
+    """Two moments of inertia nearly in a ratio up to 3, in words."""
+    for i, j in ((0, 1), (1, 2), (0, 2)):
+        larger, smaller = (i, j) if top.inertia[i] >= top.inertia[j] else (j, i)
+        quotient = top.inertia[larger] / top.inertia[smaller]
+        excess = float(quotient / round(quotient) - 1)
+        if round(quotient) <= 3 and abs(excess) < _NEAR * 20:
+            difference = f" to within {abs(excess):.1g}" if excess else ""
+            yield f"I{larger + 1}/I{smaller + 1} = {round(quotient)}{difference}"

@@ -28,7 +28,9 @@ from heavytop.records import CellMap, Histogram, Metric, Quantity, Row, RowKey, 
 
 
 FILE = "survey.parquet"
-_TEXTS = ("sweep", "integrator", "tolerance", "precision", "horizon", "class", "outcome")
+SAME = ("sweep", "integrator", "tolerance", "precision", "horizon")
+"""Columns that are equal in all motions of a row."""
+_TEXTS = (*SAME, "class", "outcome")
 _INTEGERS = ("index", "steps")
 _ERRORS = ("digits_right", "error_max", "error_time", "error_omega", "error_gamma", "error_scaled", "reference_radius")
 DRIFT_COLUMNS = ("drift_gamma_squared", "drift_area", "drift_energy", "drift_further")
@@ -172,8 +174,8 @@ def gathered(rows: Iterator[tuple[Task, Row]]) -> list[Row]:
     lost: dict[RowKey, Row] = {}
     for task, row in rows:
         key = msgspec.structs.replace(row.key, case=sweep_of(task).name)
-        chunks = tables.setdefault(key, [])
-        of_survey = msgspec.structs.replace(row, case=key.case, key=key, request=_request(task), chunk=msgspec.UNSET)
+        chunks, request = tables.setdefault(key, []), {"tops": sweep_of(task).exact_data, **(task.request or {})}
+        of_survey = msgspec.structs.replace(row, case=key.case, key=key, request=request, chunk=msgspec.UNSET)
         if not isinstance(row.chunk, bytes):
             lost.setdefault(key, of_survey)
             continue
@@ -253,11 +255,6 @@ def _worst(task: Task, case: Case, index: int, outcome: str, error: float, digit
     command = rerun(case, task.times, task.key.precision, subject.name, subject.tolerance, reached)
     right = None if math.isnan(digits) else round(digits, 2)
     return Worst(case.name, index, outcome, f"{error:.8g}" if reached else "", right, data, command)
-
-
-def _request(task: Task) -> dict[str, str]:
-    """The request of a survey: which tops, and what its table says."""
-    return {"tops": sweep_of(task).exact_data, **(task.request or {})}
 
 
 def sweep_of(task: Task) -> Sweep:

@@ -17,7 +17,7 @@ import numpy
 
 from heavytop.cases import Case
 from heavytop.extras import require_extra
-from heavytop.features.survey.gathered import DATA
+from heavytop.features.survey.gathered import DATA, SAME
 from heavytop.files import readable
 from heavytop.harness.case_text import rerun
 from heavytop.harness.plan import uniform
@@ -32,7 +32,6 @@ MOST = 5
 """Motions of a survey that are listed; the others are counted."""
 METRIC = "solution_error_relative_max"
 """The metric whose allowance in a policy also applies to the error of a motion."""
-_SAME = ("sweep", "integrator", "tolerance", "precision", "horizon")
 _TAIL = 0.025
 
 
@@ -66,7 +65,7 @@ def _records(file: Path, row: Row) -> dict[str, Any]:
     from pyarrow.parquet import read_table
 
     subject, key = row.key.subject, row.key
-    same = dict(zip(_SAME, (key.case, subject.name, subject.tolerance, key.precision, key.horizon), strict=True))
+    same = dict(zip(SAME, (key.case, subject.name, subject.tolerance, key.precision, key.horizon), strict=True))
     columns = ["index", "outcome", "error_max", "digits_right", *DATA]
     with readable(file, "Give the folder of a finished run.", pyarrow.ArrowException):
         table = read_table(file, columns=columns, filters=[(name, "=", text) for name, text in same.items()])

@@ -15,7 +15,7 @@ from heavytop.cases import Case
 from heavytop.display import Lazy
 from heavytop.errors import InputError, quoted, refusal
 from heavytop.features.survey.charts import survey_charts
-from heavytop.features.survey.gathered import DATA, FILE, chunk_bytes, gathered, of_motions, write
+from heavytop.features.survey.gathered import DATA, FILE, SAME, chunk_bytes, gathered, of_motions, write
 from heavytop.features.survey.joined import METRIC, worse_motions
 from heavytop.features.survey.measured import Chunk, Drawn, chunks, drawn, measured, number_of
 from heavytop.harness.checkpoint import Saved
@@ -143,30 +143,18 @@ class Survey(Kind):
 
 
 def _names(task: Task, motions: Drawn) -> dict[str, object]:
-    chunk = task.case
+    chunk, key = task.case, task.key
     assert isinstance(chunk, Chunk)
-    same = {
-        "sweep": chunk.sweep.name,
-        "integrator": task.key.subject.name,
-        "tolerance": task.key.subject.tolerance,
-        "precision": task.key.precision,
-        "horizon": task.key.horizon,
-    }
-    texts: dict[str, object] = {name: [text] * chunk.count for name, text in same.items()}
+    same = chunk.sweep.name, key.subject.name, key.subject.tolerance, key.precision, key.horizon
+    texts: dict[str, object] = {name: [text] * chunk.count for name, text in zip(SAME, same, strict=True)}
     return texts | {"index": numpy.arange(chunk.first, chunk.first + chunk.count), "class": motions.classes}
 
 
 def _data(motions: Drawn) -> dict[str, object]:
     p = motions.parameters
-    rotor = (*p.rotors, 0, 0)[:3]
-    parts = {"inertia": p.inertia, "moment": p.moment, "rotor": rotor, "omega": motions.start[:3]}
-    parts |= {"gamma": motions.start[3:]}
-    zeros = numpy.zeros(len(motions.problems))
-    return {
-        f"{name}{k + 1}": zeros if isinstance(column, int) else column.high[:, 0]
-        for name, columns in parts.items()
-        for k, column in enumerate(columns)
-    }
+    columns, zeros = [*p.inertia, *p.moment, *(*p.rotors, 0, 0)[:3], *motions.start], numpy.zeros(len(motions.problems))
+    pairs = zip(DATA, columns, strict=True)
+    return {name: zeros if isinstance(column, int) else column.high[:, 0] for name, column in pairs}
 
 
 def _headline(rows: Sequence[Row]) -> Iterator[Headline]:

@@ -278,10 +278,7 @@ class ProgramRequest:
         return self._numbers([rounded(value, self.problem.precision) for value in values])
 
     def _numbers(self, values: Sequence[Any]) -> list[str]:
-        precision = self.problem.precision
-        if precision == DOUBLE and not self.hexadecimal:
-            return [f"{float(value) + 0.0:.17g}" for value in values]
-        return [number_text(Fraction(value), precision, self.hexadecimal) for value in values]
+        return [number_text(Fraction(value), self.problem.precision, self.hexadecimal) for value in values]
 
 
 class Reply:
