@@ -81,6 +81,10 @@ def test_the_order_of_a_method_with_a_memory_is_that_of_its_runs(name: str) -> N
         assert ("one_step = false" in said) == (not declared and name not in KEPT_APART)
 
 
+def test_an_order_that_rounding_hides_is_that_of_coarser_steps() -> None:
+    assert row(program("extrapolation", one_step=False), step="1/1000").metrics["observed_order_runs"].value == "4"
+
+
 @pytest.mark.parametrize("name", memory.FAULTY)
 def test_a_wrong_order_is_found_whatever_is_declared(name: str) -> None:
     place, order = list(memory.FAULTY).index(name), memory.METHODS[name][1]
