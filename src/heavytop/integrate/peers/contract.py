@@ -26,22 +26,11 @@ from typing import Any, Literal
 
 import numpy
 
+from heavytop import precision as formats
 from heavytop.errors import HeavyTopError, InputError, PeerFailed, Unsupported, quoted, refusal
 from heavytop.guard import stopwatch
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.precision import (
-    DOUBLE,
-    Precision,
-    Vector,
-    cross,
-    decimal_text,
-    dot,
-    exact,
-    number,
-    parse,
-    rounded,
-    six_digits,
-)
+from heavytop.precision import DOUBLE, Precision, Vector, cross, decimal_text, dot, exact, number, rounded, six_digits
 from heavytop.top.attitude import near_quaternion, perpendicular, rotation_of, rows_of
 from heavytop.top.equations import HEAVY_TOP, NAMES, System, system
 from heavytop.top.heavy_top import HeavyTop, State
@@ -182,7 +171,7 @@ class Declared:
                 raise refusal("directions", "forward or backward", quoted(item), "Correct it.")
         for item in self.precisions or ():
             if item != "real:BITS":
-                parse(item)
+                formats.parse(item)
         if not all(map(any, self.singular_at)):
             raise InputError("A γ in singular_at must not be zero.", "Give γ, such as 0, 0, 1.")
 
