@@ -1,5 +1,6 @@
 """Motions so slow or fast that Taylor coefficients leave the exponents of double: the same in another unit of time."""
 
+import math
 from fractions import Fraction
 
 import pytest
@@ -27,6 +28,20 @@ def test_a_finite_motion_is_computed_at_every_rate(rate: str, inertia: tuple, om
             assert float(value) / size == pytest.approx(float(ball.value) / size, abs=1e-13)
     assert [list(state) for state in run.states] == [state for _, state in seen]
     assert [time for time, _ in seen] == list(run.times)
+    assert ht.Integrator(top).propagate(start, times).states.tolist() == run.states.tolist()
+    found, plain = (
+        ht.events(top, start, -5 / unit, "gamma1"),
+        ht.events(top, ht.State(omega, start.gamma), -5, "gamma1"),
+    )
+    assert found.directions.tolist() == plain.directions.tolist() != []
+    assert found.times * float(unit) == pytest.approx(plain.times, abs=1e-13)
+
+
+def test_the_attitude_of_a_slow_permanent_rotation_moves() -> None:
+    run = ht.propagate(
+        ht.HeavyTop((3, 2, 1), 2, (0, 0, 1)), ht.State((0, 0, "1e-20"), (0, 0, 1)), [2e20], attitude=True
+    )
+    assert run.matrices()[0, 0] == pytest.approx([math.cos(2), -math.sin(2), 0], abs=1e-14)
 
 
 @pytest.mark.parametrize("scale", [-60, 58])

@@ -375,6 +375,8 @@ def _options(
 _NEAR_STEPS = 1e11
 """A run of fewer expected steps is in reach without looking closer."""
 _LARGEST = float(LARGEST)
+_SLOWEST, _FASTEST = 2.0**-94, 2.0**106
+"""Squares of rates well within those of :func:`heavytop.integrate.heyoka.motions.unit_of`."""
 _SLACK = float(arguments.slack_of(DOUBLE))
 
 
@@ -464,6 +466,8 @@ class Integrator:
         # no motion changes faster than at max(|Ω|² turning, driven); no component of γ is beyond 2
         rates = problem.parameters.mapped(float)
         self._driven = square_of_rate(self._system, rates, (0.0, 0.0, 0.0, 2.0, 2.0, 2.0))
+        turns = float(rates.rotor_rate)
+        self._pull = max(turns * turns, max(map(abs, rates.moment)) / min(rates.inertia))
         still = rates._replace(moment=(0.0, 0.0, 0.0))
         self._turning = square_of_rate(self._system, still, (1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
 
@@ -542,7 +546,9 @@ class Integrator:
         return trajectory.states, trajectory.outcome, number(trajectory.time_reached, self._form), trajectory.steps
 
     def _plain(self, start: Any, targets: Sequence[OrderedRing]) -> Any:
-        """The start in doubles, checked; None for an irrational or an invalid one, which exact numbers treat."""
+        """The start in doubles, checked; None for an irrational or an invalid one, and for a motion in a unit of time
+        of its own, which exact numbers treat.
+        """
         if isinstance(start, State):
             if start.attitude is not None:
                 return None
@@ -555,6 +561,8 @@ class Integrator:
         w1, w2, w3, g1, g2, g3 = values
         fastest = max(abs(w1), abs(w2), abs(w3))
         if not (fastest < _LARGEST and abs(g1 * g1 + g2 * g2 + g3 * g3 - 1) < _SLACK):
+            return None
+        if not _SLOWEST < max(fastest * fastest, self._pull) < _FASTEST:
             return None
         span = float(targets[-1])
         if not span * span * max(fastest * fastest * self._turning, self._driven) < _NEAR_STEPS**2:

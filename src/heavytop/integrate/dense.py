@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from heavytop.errors import InputError, OutOfReach, Unsupported
 from heavytop.integrate.heyoka.engines import compiled as compile_heyoka
 from heavytop.integrate.heyoka.engines import load
-from heavytop.integrate.heyoka.motions import Stepper
+from heavytop.integrate.heyoka.motions import Stepper, in_unit, unit_of
 from heavytop.integrate.multiword.engines import choose
 from heavytop.integrate.multiword.engines import compiled as compile_words
 from heavytop.integrate.multiword.motions import OUTCOMES
@@ -187,19 +187,26 @@ def _of_heyoka(run: Dense) -> Iterator[Piece]:
     carried = problem.xi is not None
     tool = compile_heyoka(problem.system, problem.precision, attitude=carried, tolerance=run.tolerance)
     run.flags, run.seconds["compile"] = tool.flags, tool.seconds
+    unit = unit_of(problem)
     with tool.borrowed() as engine:
-        load(engine, problem)
+        load(engine, problem if unit == 1 else in_unit(problem, unit))
         run.order = engine.order
         stepper = Stepper(engine, run.until > 0, None, None)
         while not run.stopped():
-            began = sum(map(exact, engine.dtime), Fraction(0))
+            began = sum(map(exact, engine.dtime), Fraction(0)) / unit
             run.outcome = stepper.single()
             if run.outcome is not Outcome.SUCCESS or stepper.rest is not None:
                 return
             run.steps += 1
             rows = stepper.polynomial()
-            doubles = rows if problem.precision == DOUBLE else None
-            yield Piece(began, exact(engine.last_h), bits, partial(_of_row, rows), doubles=doubles)
+            doubles = rows if problem.precision == DOUBLE and unit == 1 else None
+            read = partial(_of_row, rows) if unit == 1 else partial(_in_time, rows, unit)
+            yield Piece(began, exact(engine.last_h) / unit, bits, read, doubles=doubles)
+
+
+def _in_time(rows: NDArray[numpy.float64], unit: Fraction, index: int) -> list[Dyadic]:
+    """The row of coefficients of t^n, of those of (``unit`` t)^n; that of Ω too is in units of 1/t."""
+    return [dyadic(exact(value) * unit ** (n + (index < 3))) for n, value in enumerate(rows[index])]
 
 
 def _of_multiword(run: Dense) -> Iterator[Piece]:

@@ -249,9 +249,9 @@ def integrate_to_samples(
     mark: Callable[[ResumePoint], None] | None = None,
 ) -> Trajectory:
     """The motion of ``problem`` at ``targets``, native numbers in order, computed by ``engine``, one of ``tool``'s."""
-    unit = _unit(problem)
+    unit = unit_of(problem)
     if unit != 1 and place is None and len(engine.pars):  # constants compiled in have the unit given
-        scaled, factor = _in_unit(problem, unit), number(unit, problem.precision)
+        scaled, factor = in_unit(problem, unit), number(unit, problem.precision)
         unscaled = observer and (lambda time, state: observer(time / unit, _from_unit(state, unit)))
         run = integrate_to_samples(
             tool, engine, scaled, [t * factor for t in targets], step_limit, unscaled, between, stepping=stepping
@@ -287,17 +287,20 @@ def integrate_to_samples(
     return _trajectory(tool, problem, stepper, *ended)
 
 
-def _unit(problem: Problem) -> Fraction:
+def unit_of(problem: Problem) -> Fraction:
     """The power of 2 by which time is scaled for the integration: the rate of the motion where a Taylor coefficient of
     double, rate^20 at heyoka's order, would be 0 or infinite; else 1.
     """
     if problem.precision.family != "double" or problem.precision.bits != DOUBLE.bits:
         return Fraction(1)
-    scale = rate(problem.system, problem.parameters, problem.start.flat)
+    p, start = problem.parameters, problem.start.flat
+    if problem.xi is not None and not any(problem.system.field(p, start)):
+        p = p._replace(moment=(Fraction(0),) * 3)  # a steady rotation, whose attitude alone moves
+    scale = rate(problem.system, p, start)
     return Fraction(1) if not scale or _SLOWEST < scale < _FASTEST else scale
 
 
-def _in_unit(problem: Problem, unit: Fraction) -> Problem:
+def in_unit(problem: Problem, unit: Fraction) -> Problem:
     """The motion in the time t ``unit``; exact within the exponent range of the format."""
     p, rotors = problem.parameters, tuple(Fraction(value) / unit for value in problem.parameters.rotors)
     moment = tuple(Fraction(value) / unit**2 for value in p.moment)
