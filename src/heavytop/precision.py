@@ -633,6 +633,12 @@ def cross(a: Sequence[Scalar], b: Sequence[Scalar]) -> tuple[Scalar, Scalar, Sca
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
+def square_root(value: Fraction, bits: int) -> Fraction:
+    """The square root of a positive rational, relatively within some 2^-bits."""
+    shift = bits + max(0, value.denominator.bit_length() - value.numerator.bit_length()) // 2
+    return Fraction(isqrt((value.numerator << 2 * shift) // value.denominator), 1 << shift)
+
+
 def rational_root(square: Fraction) -> Fraction | None:
     """√square if that is rational, else None."""
     if square < 0:

@@ -19,7 +19,6 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
-from math import isqrt
 from types import ModuleType, SimpleNamespace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -37,6 +36,7 @@ from heavytop.precision import (
     ordered,
     physical,
     round_to,
+    square_root,
     vector,
 )
 
@@ -127,8 +127,7 @@ def quaternion_of_rows(rows: Rows[Real], lib: Library) -> tuple[Real, Real, Real
 def near_quaternion(rows: Rows[Fraction], bits: int) -> tuple[Fraction, ...]:
     """The quaternion of rational rows, in rationals, of length 1 to within 2^-bits."""
     multiple = multiple_of_quaternion(rows)
-    square = sum((value * value for value in multiple), Fraction(0))
-    length = Fraction(isqrt((square.numerator << 2 * bits) // square.denominator), 1 << bits)
+    length = square_root(sum((value * value for value in multiple), Fraction(0)), bits)
     return tuple(value / length for value in multiple)
 
 

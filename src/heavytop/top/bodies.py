@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import permutations
-from math import isqrt, lcm
+from math import lcm
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from heavytop.precision import (
     round_to,
     shown,
     six_digits,
+    square_root,
     vector,
 )
 from heavytop.top.attitude import Attitude, Rows, Three, multiplied, perpendicular, rotated, rotation_of, transposed
@@ -206,13 +207,8 @@ def _half_angle(rows: Sequence[Sequence[Fraction]], i: int, j: int, bits: int) -
         return Fraction(0)
     # tan 2φ = −2 J_ij/(J_jj − J_ii) for the rotation R_k(φ), i j k cyclic, of Jᵢⱼ' = 0
     theta = (rows[j][j] - rows[i][i]) / (2 * rows[i][j])
-    t = -1 / (abs(theta) + _root(theta * theta + 1, bits)) * (1 if theta >= 0 else -1)
-    return round_to(t / (1 + _root(1 + t * t, bits)), bits)
-
-
-def _root(value: Fraction, bits: int) -> Fraction:
-    """√value for value ≥ 1, within 2^-bits of it relatively."""
-    return Fraction(isqrt((value.numerator << 2 * bits) // value.denominator), 1 << bits)
+    t = -1 / (abs(theta) + square_root(theta * theta + 1, bits)) * (1 if theta >= 0 else -1)
+    return round_to(t / (1 + square_root(1 + t * t, bits)), bits)
 
 
 def _product(p: Sequence[Fraction], q: Sequence[Fraction]) -> tuple[Fraction, ...]:

@@ -12,14 +12,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
-from math import isqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from heavytop.display import plural
 from heavytop.errors import InputError, nearest, prefixed, quoted, refusal
 from heavytop.files import read_whole, readable
-from heavytop.precision import Vector, cross, exact, round_to, six_digits, vector
+from heavytop.precision import Vector, cross, exact, round_to, six_digits, square_root, vector
 from heavytop.top import inertia_slips
 from heavytop.top.attitude import Attitude, multiplied, rotated, transposed
 from heavytop.top.inertia_slips import Six, Tensor, rows, six_of
@@ -770,8 +769,7 @@ def _unit(values: Sequence[Fraction]) -> Vector:
     square = x * x + y * y + z * z
     if not square:
         raise InputError("An axis must not be zero.", "Give the axis of the frame.")
-    shift = max(0, square.denominator.bit_length() - square.numerator.bit_length()) // 2 + 2 * _BITS
-    length = Fraction(isqrt((square.numerator << 2 * shift) // square.denominator), 1 << shift)
+    length = square_root(square, 2 * _BITS)
     return x / length, y / length, z / length
 
 

@@ -357,7 +357,6 @@ _ARRAYS = {
 }
 """Keys of JSON documents whose values are a list for each time."""
 KEYS = {*CONVENTIONS, *STARTS, *BODIES, *_ARRAYS}
-_REMEDY = "`heavytop docs score` describes the file formats."
 
 
 @dataclass(frozen=True, slots=True)
@@ -424,7 +423,9 @@ def _is_direction(value: object) -> bool:
 def _word(document: Mapping[str, Any], key: str) -> str | None:
     value = document.get(key)
     if value is not None and not isinstance(value, str):
-        raise InputError(f"{key} must be a word; got {quoted(value)}.", _REMEDY)
+        raise InputError(
+            f"{key} must be a word; got {quoted(value)}.", "`heavytop docs score` describes the file formats."
+        )
     return None if value is None else value.strip()
 
 
@@ -669,11 +670,6 @@ def _attitude(value: object, name: str, key: str, convention: Convention) -> tup
 
 def times(document: Mapping[str, Any]) -> list[Fraction]:
     """The column t of a text table; raises InputError that names the line of what is not a finite number."""
-    header, instants = document["header"], []
-    unit = header.units.get("t")
-    for number, row in zip(document["lines"], document["cells"], strict=True):
-        value = cell(text := row[header.time], f"Line {number}, column t")
-        if value is None:
-            raise InputError(f"Line {number}, column t: {text.strip()} is not a finite number.", _REMEDY)
-        instants.append(value if unit is None else unit.size * value)
-    return instants
+    header, rows = document["header"], zip(document["lines"], document["cells"], strict=True)
+    size = header.units["t"].size if "t" in header.units else 1
+    return [size * written_numbers.finite(row[header.time], f"Line {number}, column t") for number, row in rows]

@@ -228,7 +228,8 @@ def _cells(line: str, separator: str | None) -> list[str]:
     if separator is None and any(mark in line for mark in ";,\t"):
         separator = _separator(line)
     line = _REMARK.sub("", line).rstrip()
-    cells = _COMMA.split(line) if separator == "," else line.split(separator)
+    in_brackets = separator == "," and ("[" in line or "(" in line)
+    cells = _COMMA.split(line) if in_brackets else line.split(separator)
     # a separator behind the last column is not a column
     if separator and len(cells) > 1 and not cells[-1].strip():
         cells = cells[:-1]

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import chain
-from math import isqrt
 from typing import Any
 
 import numpy
@@ -28,6 +27,7 @@ from heavytop.precision import (
     round_to,
     shown,
     six_digits,
+    square_root,
 )
 from heavytop.top.attitude import Angle, Attitude, multiple_of_quaternion, perpendicular, rotated, rotation_of
 from heavytop.top.bodies import CENTRE, IDENTITY, Body
@@ -459,11 +459,8 @@ def _normalized(name: str, rows: list[tuple[Fraction, ...]]) -> list[tuple[Fract
 
 def unit(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
     """The vector over its length, to 128 bits."""
-    largest = max(map(abs, values))
-    scaled = [value / largest for value in values]
-    square, scale = sum(value * value for value in scaled), 1 << 128
-    length = Fraction(isqrt(int(square * scale * scale)), scale)
-    return tuple(Fraction(round(value / length * scale), scale) for value in scaled)
+    length, scale = square_root(sum((value * value for value in values), Fraction(0)), 128), 1 << 128
+    return tuple(Fraction(round(value / length * scale), scale) for value in values)
 
 
 def of_observed_arrays(
