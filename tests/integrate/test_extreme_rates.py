@@ -28,7 +28,8 @@ def test_a_finite_motion_is_computed_at_every_rate(rate: str, inertia: tuple, om
             assert float(value) / size == pytest.approx(float(ball.value) / size, abs=1e-13)
     assert [list(state) for state in run.states] == [state for _, state in seen]
     assert [time for time, _ in seen] == list(run.times)
-    assert ht.Integrator(top).propagate(start, times).states.tolist() == run.states.tolist()
+    (member,), prepared = ht.ensemble(top, [start], times), ht.Integrator(top).propagate(start, times)
+    assert member.states.tolist() == prepared.states.tolist() == run.states.tolist()
     found, plain = (
         ht.events(top, start, -5 / unit, "gamma1"),
         ht.events(top, ht.State(omega, start.gamma), -5, "gamma1"),

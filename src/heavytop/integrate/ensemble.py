@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
+from itertools import compress
 from queue import SimpleQueue
+from threading import Event
 from typing import Any
 
 import numpy
@@ -15,10 +18,13 @@ from heavytop.errors import InputError, refusal
 from heavytop.guard import processors
 from heavytop.integrate.heyoka.engines import Compiled, compiled
 from heavytop.integrate.heyoka.lanes import LaneIntegrator, Lanes, Work
-from heavytop.integrate.heyoka.motions import integrate_to_samples
+from heavytop.integrate.heyoka.motions import integrate_to_samples, unit_of
 from heavytop.integrate.trajectory import EnsembleObserver, Finished, Problem, Trajectory
 from heavytop.precision import DOUBLE, OrderedRing, exact, number, require
 from heavytop.top.heavy_top import check_times
+
+_FARTHEST = 2**40
+"""Units of time of its own to which a motion is followed one by one; a faster one fails at once in lanes."""
 
 
 def propagate_ensemble(
@@ -40,8 +46,8 @@ def propagate_ensemble(
     calling thread; the times of each problem in order, the problems mixed.
     finished: called with (index of the problem, its motion) as each ends, by the same thread, after its samples.
     threads: None for one per processor that this process may use.
-    lanes: motions side by side in a batch engine, in double; other formats have none, and give the bits of
-    :func:`heavytop.integrate.heyoka.motions.propagate`.
+    lanes: motions side by side in a batch engine, in double; other formats, and motions in a unit of time of their own,
+    have none, and give the bits of :func:`heavytop.integrate.heyoka.motions.propagate`.
     step_limit: for each motion; the times reached until then are returned.
     options: tolerance, high_accuracy, compact_mode as in :func:`heavytop.integrate.heyoka.engines.compiled`.
 
@@ -55,11 +61,19 @@ def propagate_ensemble(
     if lanes < 2:
         raise refusal("lanes", "at least 2", lanes, "Use 2 lanes or more.")
     batch = first.precision == DOUBLE and work.moves
-    width = lanes if batch else None
-    tool = compiled(first.system, first.precision, attitude=first.xi is not None, lanes=width, **options)
-    work.lanes = LaneIntegrator("heyoka:batch", tool.engine.order, tool.seconds, tool.flags)
-    run = partial(_in_lanes if batch else _one_by_one, work, tool)
-    return in_threads(run, work, threads, width or 1, observer, finished)
+    span = abs(work.times[-1])
+    one_by_one = [not batch or ((unit := unit_of(problem)) != 1 and unit * span < _FARTHEST) for problem in problems]
+    parts: list[Iterator[Trajectory]] = []
+    for run, singly, width in ((_in_lanes, False, lanes), (_one_by_one, True, None)):
+        pending = deque(compress(work.pending, (alone == singly for alone in one_by_one)))
+        part = replace(work, pending=pending, stop=Event())
+        runs: list[Trajectory] = []
+        if part.pending:
+            tool = compiled(first.system, first.precision, attitude=first.xi is not None, lanes=width, **options)
+            part.lanes = LaneIntegrator("heyoka:batch", tool.engine.order, tool.seconds, tool.flags)
+            runs = in_threads(partial(run, part, tool), part, threads, width or 1, observer, finished)
+        parts.append(iter(runs))
+    return [next(parts[alone]) for alone in one_by_one]
 
 
 def work_of(

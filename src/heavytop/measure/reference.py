@@ -52,7 +52,6 @@ GUARD_BITS = 32
 """Bits of a state beyond those requested; only Euler angles near gimbal lock lose more."""
 _WORKING_BITS = 32
 _ATTEMPTS = 5
-_SMALL = Fraction(1, 10**290)
 UNDEFINED = "nan", "inf"
 """Value and radius of an Euler angle at gimbal lock."""
 
@@ -94,8 +93,10 @@ class KnownMotion:
         A position is accurate to the digits relative to |p|, any other number relative to a size above 1.
         Raises OutOfReach if the digits cannot be proven.
         """
-        narrow = self._narrow(output)
-        outputs = [self._value(index, output, narrow) for index in range(len(self.times))]
+        scale = Fraction(1)
+        if output.name == "position":
+            scale = max(abs(part) for part in (*output.point_of(self.centre), *output.pivot))
+        outputs = [self._value(index, output, scale) for index in range(len(self.times))]
         if output.name == "quaternion" and outputs:
             turns = self.signs(outputs)
             # negated exactly: the minus sign would round to FLINT's current precision
@@ -125,13 +126,13 @@ class KnownMotion:
         sign = first_sign(q, Fraction(1, 1 << bits_of(self.digits)))
         return [sign * float(part) for part in q]
 
-    def _value(self, index: int, output: Output, narrow: float) -> list[arb | None]:
+    def _value(self, index: int, output: Output, scale: Fraction) -> list[arb | None]:
         bits, extra = bits_of(self.digits), GUARD_BITS
         most_extra = 2 * bits + 2 * GUARD_BITS if output.name == "euler" else math.inf
         state = self.at(index)
         for _ in range(_ATTEMPTS):
             values = self._evaluated(state, bits + extra, output)
-            lacking = max(self._lacking(value, output, narrow) for value in values)
+            lacking = max(self._lacking(value, output, scale) for value in values)
             if lacking <= 0:
                 return list(values)
             if extra >= most_extra or (output.name == "euler" and self._locked(state, output)):
@@ -144,7 +145,7 @@ class KnownMotion:
                     raise
                 break
         if output.name == "euler":
-            return [None if self._lacking(value, output, narrow) > 0 else value for value in values]
+            return [None if self._lacking(value, output, scale) > 0 else value for value in values]
         raise OutOfReach(
             f"The {output.name} at t = {shown(self.times[index])} is not known to {self.digits} digits, by "
             f"{self.method}.",
@@ -165,16 +166,8 @@ class KnownMotion:
                 gamma = [part / length for part in gamma]
             return list(output.at(omega, gamma, xi, self.centre, _BALLS, ball))
 
-    def _narrow(self, output: Output) -> float:
-        """A sufficient radius of a position in double; 0 out of the range of doubles, and for other outputs."""
-        if output.name != "position":
-            return 0.0
-        size = max(abs(part) for part in (*output.point_of(self.centre), *output.pivot))
-        tenth = Fraction(8, 10 ** (self.digits + 1))
-        return float(size * tenth) if _SMALL < size * tenth < 1 else 0.0
-
-    def _lacking(self, value: arb, output: Output, narrow: float) -> float:
-        """Bits by which a ball is too wide; inf if it is not finite.  narrow: from :meth:`_narrow`."""
+    def _lacking(self, value: arb, output: Output, scale: Fraction) -> float:
+        """Bits by which a ball is too wide; inf if it is not finite.  scale: of a position, and the least of others."""
         if not value.is_finite():
             return math.inf
         if self.as_written or value.is_exact():
@@ -182,11 +175,7 @@ class KnownMotion:
         if output.name != "position":
             if value.rel_one_accuracy_bits() >= bits_of(self.digits):
                 return 0
-        elif float(value.rad()) < narrow:
-            return 0
-        scale = max(Fraction(1), abs(midpoint(value)))
-        if output.name == "position":
-            scale = max(abs(part) for part in (*output.point_of(self.centre), *output.pivot))
+            scale = max(scale, abs(midpoint(value)))
         # the printed value is rounded to one digit more than requested, by at most half a unit of it
         allowed, width = scale * Fraction(9, 10 ** (self.digits + 1)), radius(value)
         if width <= allowed:

@@ -42,7 +42,7 @@ _ON_A_GRID = {"double": 500_000, "extended": 100_000, "quad": 10_000}
 """The most steps of such a call, which cannot be interrupted: about a second."""
 _GROWTH = 16
 """At most so many times the steps so far are taken at once: few steps say little about the longest."""
-_SLOWEST, _FASTEST = Fraction(1, 2**48), Fraction(2) ** 55
+_SLOWEST, _FASTEST, _SLOW, _FAST = Fraction(1, 2**48), Fraction(2) ** 55, 2.0**-46, 2.0**52
 """Rates between which no Taylor coefficient leaves the exponent range of double."""
 
 
@@ -294,6 +294,9 @@ def unit_of(problem: Problem) -> Fraction:
     if problem.precision.family != "double" or problem.precision.bits != DOUBLE.bits:
         return Fraction(1)
     p, start = problem.parameters, problem.start.flat
+    driven = max(abs(float(value)) for value in (*p.moment, *p.rotors))
+    if _SLOW < max(abs(float(value)) for value in start[:3]) < _FAST and driven < _FAST * float(min(p.inertia)):
+        return Fraction(1)  # without fractions
     if problem.xi is not None and not any(problem.system.field(p, start)):
         p = p._replace(moment=(Fraction(0),) * 3)  # a steady rotation, whose attitude alone moves
     scale = rate(problem.system, p, start)
