@@ -210,7 +210,9 @@ samples = 10
 ladders = [{{ integrator = "{0}", steps = ["1/10", "1/20", "1/40"] }}]
 """
 FILE = """
-from validation import unusual_programs
+import sys
+sys.path.append({here!r})
+import unusual_programs
 unusual_programs.FAULT = {fault}
 peer = unusual_programs.peer({name!r})
 """
@@ -233,7 +235,7 @@ def measured(folder: Path, name: str, fault: float) -> tuple[Path, int, str]:
     folder = folder / str(fault)
     folder.mkdir()
     file, plan = folder / "m.py", folder / "p.toml"
-    file.write_text(FILE.format(name=name, fault=fault), "utf-8")
+    file.write_text(FILE.format(name=name, fault=fault, here=str(Path(__file__).parent)), "utf-8")
     plan.write_text(PLAN.format("./m.py:peer"), "utf-8")
     code, text = said("run", "--plan", str(plan), "--out", str(folder / "report"))
     return folder / "report", code, text
