@@ -74,6 +74,15 @@ def rest(top: HeavyTop, start: State, times: Times, precision: Precision, *, sys
     return run
 
 
+def corner(top: HeavyTop, start: State, times: Times, precision: Precision, *, system: System) -> Trajectory:
+    """An error that grows towards one ratio of moments and one direction of Ω, as 1/distance²."""
+    run = propagate(top, start, times, precision, system=system)
+    speed = math.hypot(*map(float, start.omega)) or 1.0
+    apart = abs(float(top.inertia[0] / top.inertia[1]) - 1.4) + abs(float(start.omega[0]) / speed - 0.6)
+    size = min(1e-4, float(precision.eps) / max(apart, 1e-12) ** 2)
+    return replace(run, states=[state * (1 + size) for state in run.states])
+
+
 def processor_seconds() -> float:
     """Of this process and of children that have ended."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
@@ -97,6 +106,6 @@ def measure(integrator: str, budget: str, seed: int) -> None:
 
 if __name__ == "__main__":
     for seed in map(int, sys.argv[1:] or ["1", "2", "3"]):
-        for fault in ("ratio", "branch", "spin", "rest"):
+        for fault in ("ratio", "branch", "spin", "rest", "corner"):
             measure(f"{__file__}:{fault}", "120s", seed)
         measure("heyoka", "2000", seed)

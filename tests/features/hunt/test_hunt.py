@@ -55,6 +55,11 @@ def test_a_planted_fault_is_found_and_shrunk(fault: str, monkeypatch: pytest.Mon
 
 
 @pytest.mark.slow
+def test_changes_of_the_worst_motions_find_what_random_ones_rarely_meet(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert hunted("corner", monkeypatch, budget=512, horizon=1).found
+
+
+@pytest.mark.slow
 def test_a_fault_of_heavy_gyrostats_is_found_shrunk_and_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     hunt = hunted("rotor", monkeypatch, budget=10, horizon=1, family="heavy_gyrostat")
     worst = hunt.found[0]
