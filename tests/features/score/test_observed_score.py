@@ -360,3 +360,24 @@ def test_a_tensor_about_the_other_point_is_told(about: str, tmp_path: Path) -> N
     told = [text for text in read(file, None, True).warnings() if "not a rigid body's" in text]
     assert len(told) == (about == "pivot")
     assert all("is about the centre of mass, and was read as about the pivot" in text for text in told)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "factor"), [("omega_in_degrees", 180 / np.pi), ("omega_reversed", -1)])
+def test_omega_is_compared_with_the_rate_of_the_attitude_where_the_body_is_another(kind, factor, tmp_path) -> None:
+    motion, q, omega = BODY
+    near = conventions.integrate(motion, motion.rotation[0], motion.omega[0], [0.02 * i for i in range(1, 41)])
+    other = replace(near, inertia=near.inertia * (1 + np.diag([0, 0.2, 0.1])))
+    wrong = conventions.columns(omega=lambda value: factor * value)
+    (told,) = scored(conventions.as_csv(other, q, omega, Written(("quaternion", "omega")), wrong), tmp_path).diagnoses
+    assert (told.kind, told.numbers) == (kind, {"of": "rates"})
+
+
+def test_columns_that_give_one_attitude_and_differ_are_said(tmp_path: Path) -> None:
+    shifted = conventions.columns(matrix=lambda rows: rows + 1e-3)
+    (told,) = scored(conventions.as_csv(*BODY, Written(("quaternion", "matrix")), shifted), tmp_path).diagnoses
+    assert (told.kind, told.numbers["columns"], told.numbers["by"]) == (
+        "columns_disagree",
+        "quaternion and matrix",
+        "1.00e-03",
+    )
