@@ -150,7 +150,8 @@ class InputError(HeavyTopError):
 
 def refusal(what: str, rule: str, value: object, remedy: str) -> InputError:
     """The error of a value that breaks a rule: ``WHAT must be RULE; got VALUE.``"""
-    return InputError(f"{argument(what)} must be {rule}; got {value}.", remedy)
+    text = quoted(value) if isinstance(value, int) else value  # Python prints 4300 digits at most
+    return InputError(f"{argument(what)} must be {rule}; got {text}.", remedy)
 
 
 class MissingExtra(InputError):
