@@ -18,7 +18,11 @@ def test_detest_b5_at_20_is_what_an_integration_of_its_own_equations_gives() -> 
     state = ht.reference(case.body, case.given_start, [20], 30).texts()[0]
     scale = (Fraction(33, 32), Fraction(141, 160), Fraction(5, 4))
     y = [Fraction(text) / factor for text, factor in zip(state[:3], scale, strict=True)]
-    own = ("-0.939657079872920396188436231591", "-0.342117775400074906534822116696", "0.741412659619995300782558677874")
+    own = (
+        "-0.939657079872920396188436231591",
+        "-0.342117775400074906534822116696",
+        "0.741412659619995300782558677874",
+    )
     assert max(abs(a - Fraction(b)) for a, b in zip(y, own, strict=True)) < Fraction(1, 10**29)
 
 

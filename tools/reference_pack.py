@@ -161,7 +161,12 @@ def schema() -> dict[str, Any]:
         "times": texts,
         **{name: rows(size) for name, size in _QUANTITIES},
     }
-    motion = {"type": "object", "required": list(properties), "properties": properties, "additionalProperties": False}
+    motion = {
+        "type": "object",
+        "required": list(properties),
+        "properties": properties,
+        "additionalProperties": False,
+    }
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "heavytop reference pack",

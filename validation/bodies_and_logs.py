@@ -468,7 +468,12 @@ def logs_of(g: Motion, f: Motion) -> Iterator[tuple[str, str, str | bytes, str]]
     text = table(g, f"# {tum}", p, xyzw, separator=" ", times=stamps)
     yield "TUM, CRLF", "txt", text.replace("\n", "\r\n").encode(), ""
     yield "TUM, mark", "txt", mark + text.encode(), ""
-    yield ("plain, mark and CRLF", "csv", mark + table(g, "t,qw,qx,qy,qz", q).replace("\n", "\r\n").encode(), "")
+    yield (
+        "plain, mark and CRLF",
+        "csv",
+        mark + table(g, "t,qw,qx,qy,qz", q).replace("\n", "\r\n").encode(),
+        "",
+    )
     kitti = "\n".join(
         " ".join(csv(part).replace(",", " ") for part in np.c_[r, t]) for r, t in zip(g.turns, p, strict=True)
     )
@@ -476,7 +481,12 @@ def logs_of(g: Motion, f: Motion) -> Iterator[tuple[str, str, str | bytes, str]]
     ros = ",".join(f"pose.orientation.{a}" for a in "xyzw") + "," + ",".join(f"twist.angular.{a}" for a in "xyz")
     yield "ROS 2", "csv", table(g, f"{stamp},{ros}", xyzw, o, times=seconds), ""
     odometry = ros.replace("pose.", "pose.pose.").replace("twist.", "twist.twist.")
-    yield ("ROS odometry", "csv", table(g, f"{stamp},{odometry}", xyzw, o, times=seconds), "")
+    yield (
+        "ROS odometry",
+        "csv",
+        table(g, f"{stamp},{odometry}", xyzw, o, times=seconds),
+        "",
+    )
     field = (
         ",".join(f"field.orientation.{a}" for a in "xyzw")
         + ","
@@ -492,7 +502,12 @@ def logs_of(g: Motion, f: Motion) -> Iterator[tuple[str, str, str | bytes, str]]
         "",
     )
     yield "ROS 1", "csv", table(g, f"header.stamp.secs,header.stamp.nsecs,{ros}", xyzw, o, times=seconds), ""
-    yield ("stamp_sec", "csv", table(g, f"stamp_sec,stamp_nanosec,{ros.replace('.', '_')}", xyzw, o, times=seconds), "")
+    yield (
+        "stamp_sec",
+        "csv",
+        table(g, f"stamp_sec,stamp_nanosec,{ros.replace('.', '_')}", xyzw, o, times=seconds),
+        "",
+    )
     free = ",".join(f"qpos[{k}]" for k in range(3, 7)) + "," + ",".join(f"qvel[{k}]" for k in range(3, 6))
     yield "MuJoCo, free", "csv", table(g, f"time,{free}", q, o, head="# joint: free\n"), ""
     ball = ",".join(f"qpos_{k}" for k in range(4)) + "," + ",".join(f"qvel_{k}" for k in range(3))

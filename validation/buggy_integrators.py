@@ -150,7 +150,10 @@ horizon = "5"
 samples = 7
 ladders = [{{ integrator = "mine.py:{name}_peer", {settings} }}]
 """
-SETTINGS = {"rk4": 'steps = ["1/10", "1/30", "1/100"]', "dp5": 'tolerances = ["1e-4", "1e-6", "1e-8"]'}
+SETTINGS = {
+    "rk4": 'steps = ["1/10", "1/30", "1/100"]',
+    "dp5": 'tolerances = ["1e-4", "1e-6", "1e-8"]',
+}
 _TENTH = 1.1
 _ROUNDING = -12.0
 """log10 of errors up to which rounding may have made them, over the steps of the plan."""

@@ -783,7 +783,11 @@ def defined_in_steps() -> Iterator[Claim]:
             "{0}/(1 + t^2)",
         ),
         "roots": ("sqrt(1 + t^2)", "sqrt(1 + {0}^2)", f"{{0}}/sqrt({steps} + 1 + t^2)"),
-        "mean": ("1 + exp(t)", "({0} + 1 + exp(t))^2/(2*{0} + 2*(1 + exp(t)))", "{0}/(1 + exp(t))"),
+        "mean": (
+            "1 + exp(t)",
+            "({0} + 1 + exp(t))^2/(2*{0} + 2*(1 + exp(t)))",
+            "{0}/(1 + exp(t))",
+        ),
         "sums": ("sin(t)^2", "{0} + sin(t)^2 + cos(t)^2", f"{{0}} - sin(t)^2 - {steps - 1}"),
         "quotients": ("exp(t)", "{0}*(1 + exp(t))^2/(1 + 2*exp(t) + exp(2*t))", "{0}*exp(-t)"),
         "tanh": ("tanh(t)", "({0} + tanh(t))*(1 + {0}*tanh(t))/(1 + {0}*tanh(t))/2", "1 + {0} - tanh(t)"),

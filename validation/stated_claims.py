@@ -429,7 +429,11 @@ def euler_theta() -> Family:
         motion={
             "omega": ["M1/I1", "M2/I2", "M3/I3"],
             "gamma": ["M1/G", "M2/G", "M3/G"],
-            "angles": ["atan2(M1, M2)", "acos(M3/G)", "(G/I1 - p*thetaRate(s, m))*t + thetaArgument(p*t, s, m)"],
+            "angles": [
+                "atan2(M1, M2)",
+                "acos(M3/G)",
+                "(G/I1 - p*thetaRate(s, m))*t + thetaArgument(p*t, s, m)",
+            ],
         },
     )
     third = "G/I3*t + G*(I3 - I2)*(I3 - I1)/(I3*I1*(I3 - I2)*p)*ellipticPi(-I3*(I2 - I1)/(I1*(I3 - I2)), am(p*t, m), m)"
@@ -671,7 +675,11 @@ def _rows_of_quaternion(sign: str = "-") -> list[list[str]]:
             f"-cos({u})*sin({v}) - sin({u})*{h}*cos({v})",
             f"sin({u})*{s}",
         ],
-        [f"sin({u})*cos({v}) + cos({u})*{h}*sin({v})", f"-sin({u})*sin({v}) + cos({u})*{h}*cos({v})", f"-cos({u})*{s}"],
+        [
+            f"sin({u})*cos({v}) + cos({u})*{h}*sin({v})",
+            f"-sin({u})*sin({v}) + cos({u})*{h}*cos({v})",
+            f"-cos({u})*{s}",
+        ],
         [f"{s}*sin({v})", f"{s}*cos({v})", h],
     ]
 

@@ -42,7 +42,8 @@ def motion_of(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "time"), [(name, Fraction(-1) if place % 2 else Fraction(7, 3)) for place, name in enumerate(MOTIONS)]
+    ("name", "time"),
+    [(name, Fraction(-1) if place % 2 else Fraction(7, 3)) for place, name in enumerate(MOTIONS)],
 )
 def test_the_laws_of_the_flow_hold_as_narrow_balls(name, time):
     motion = motion_of(name)
@@ -147,7 +148,12 @@ def test_balls_of_few_digits_hold_those_of_many():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("size", "precision", "of_motion"),
-    [(2.0**20, 256, 256), (2.0**90, 270, 270), (2.0**-120, 184, 440), (2.0**100, 270, 184)],
+    [
+        (2.0**20, 256, 256),
+        (2.0**90, 270, 270),
+        (2.0**-120, 184, 440),
+        (2.0**100, 270, 184),
+    ],
 )
 def test_the_bound_of_a_step_holds_at_every_corner_of_its_set_of_errors(size, precision, of_motion):
     """Φ and σ at c + w, in more bits, against those of c, in integers and (184 and 270 bits) in words.

@@ -11,7 +11,15 @@ from heavytop.exact.cases.pendulum import Pendulum
 from heavytop.exact.catalogue import find
 from heavytop.precision import cross
 from heavytop.top.heavy_top import HeavyTop, State
-from support.proofs import assert_attitude, assert_narrow, assert_overlap, assert_solves, positive, rational, triple
+from support.proofs import (
+    assert_attitude,
+    assert_narrow,
+    assert_overlap,
+    assert_solves,
+    positive,
+    rational,
+    triple,
+)
 
 F = Fraction
 UNIT = (F(2, 3), F(-1, 3), F(2, 3))

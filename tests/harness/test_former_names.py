@@ -102,7 +102,10 @@ def test_a_run_of_before_goes_on(now: Path, tmp_path: Path) -> None:
         "plan integrator": "multiword",
         "commit": "words",
     }
-    assert records.of_plan({"name": "words", "integrator": "words"}) == {"name": "words", "integrator": "multiword"}
+    assert records.of_plan({"name": "words", "integrator": "words"}) == {
+        "name": "words",
+        "integrator": "multiword",
+    }
 
 
 def _interrupted(*_: object) -> None:

@@ -69,7 +69,7 @@ CHANGES: dict[str, list[dict[str, Any]]] = {
         *({"rate_times": ["1", "3", "4"]}, {"directions": ["backward"]}),
     ],
     "claim_model": [
-        *({"cases": ["ershkov-partial-6"]}, {"times": ["1.5", "2"]}, {"grid": 8}, {"directions": ["backward"]})
+        *({"cases": ["ershkov-partial-6"]}, {"times": ["1.5", "2"]}, {"grid": 8}, {"directions": ["backward"]}),
     ],
     "drift": [
         *({"cases": ["lagrange"]}, {"integrator": "multiword"}, {"attitude": True}, {"noise": True}),
@@ -96,7 +96,7 @@ CHANGES: dict[str, list[dict[str, Any]]] = {
         {"found": "tops.toml"},
     ],
     "local_error": [
-        *({"cases": ["lagrange"]}, {"precisions": ["extended"]}, {"horizon": "2"}, {"integrator": "multiword"})
+        *({"cases": ["lagrange"]}, {"precisions": ["extended"]}, {"horizon": "2"}, {"integrator": "multiword"}),
     ],
     "survey": [
         *({"horizon": "3"}, {"precision": "extended"}, {"samples": 4}, {"integrator": "multiword"}),

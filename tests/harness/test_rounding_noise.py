@@ -50,7 +50,10 @@ FORMULAS = {"kind": "claim_evaluation", "cases": ["ershkov-partial-2"], "precisi
 CURVE = {"kind": "work_precision", "cases": ["euler"], "horizon": "100", "samples": 4}
 LADDERS = [{"integrator": "heyoka", "tolerances": ["1e-8", "eps"]}]
 UNBANDED = plan_of(
-    {"name": "unbanded", "measure": [STEPS, FORMULAS | {"rate_times": ["1", "8", "40"]}, CURVE | {"ladders": LADDERS}]}
+    {
+        "name": "unbanded",
+        "measure": [STEPS, FORMULAS | {"rate_times": ["1", "8", "40"]}, CURVE | {"ladders": LADDERS}],
+    }
 )
 
 

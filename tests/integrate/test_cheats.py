@@ -321,7 +321,12 @@ def test_a_count_of_steps_makes_no_step_shorter_that_has_its_length_given() -> N
 
 
 @pytest.mark.parametrize(
-    ("name", "kind"), [("random", "drift"), ("last_bit", "local_error"), ("other_steps", "growth")]
+    ("name", "kind"),
+    [
+        ("random", "drift"),
+        ("last_bit", "local_error"),
+        ("other_steps", "growth"),
+    ],
 )
 def test_two_equal_calls_that_differ_are_said_so_in_every_kind(name: str, kind: str) -> None:
     more = {"decades": 1, "starts": 8} if kind == "growth" else {}

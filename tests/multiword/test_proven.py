@@ -70,7 +70,12 @@ def used(motion: ScaledMotion, certified: CertifiedSeries, centre: list[int], ha
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "system", "attitude"),
-    [(3, HEAVY_TOP, False), (4, GYROSTAT, False), (6, HEAVY_GYROSTAT, True), (12, HEAVY_GYROSTAT, False)],
+    [
+        (3, HEAVY_TOP, False),
+        (4, GYROSTAT, False),
+        (6, HEAVY_GYROSTAT, True),
+        (12, HEAVY_GYROSTAT, False),
+    ],
     ids=lambda value: getattr(value, "name", value),
 )
 def test_what_coefficients_lack_is_within_the_bound(words: int, system, attitude: bool) -> None:

@@ -489,10 +489,17 @@ def test_a_series_is_within_the_bound_of_what_is_unresolved(value: str, contradi
 
 PSI = "claim_evaluation_error_psi"
 COUNT, FROM = "claim_evaluation_psi_samples_not_finite", "claim_evaluation_psi_not_finite_from"
-FORMULA = {f"{PSI}_max_finite": error("1e-12"), COUNT: Metric("1", 0.0, "value"), FROM: Metric("100", 2.0, "duration")}
+FORMULA = {
+    f"{PSI}_max_finite": error("1e-12"),
+    COUNT: Metric("1", 0.0, "value"),
+    FROM: Metric("100", 2.0, "duration"),
+}
 WORK = {"error_max": error("2e-12"), "error_final": error("1e-12")}
 OF_FORMULA = {PSI: ["1e-13", "1e-12", "nan"]}
-OF_WORK = {"solution_error_omega": ["1e-13", "2e-12", "1e-13"], "solution_error_gamma": ["1e-13", "1e-13", "1e-12"]}
+OF_WORK = {
+    "solution_error_omega": ["1e-13", "2e-12", "1e-13"],
+    "solution_error_gamma": ["1e-13", "1e-13", "1e-12"],
+}
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,10 @@ def test_the_same_numbers_written_otherwise_are_the_same() -> None:
 @pytest.mark.parametrize(("old", "new"), [(None, DATA), (DATA, None)])
 def test_data_in_one_report_only_are_incomparable(old: Data | None, new: Data | None) -> None:
     who = "candidate" if old is None else "baseline"
-    assert judged(row(data=old), row(data=new)) == ("incomparable", f"only the {who} contains its top and start")
+    assert judged(row(data=old), row(data=new)) == (
+        "incomparable",
+        f"only the {who} contains its top and start",
+    )
     assert judged(row(), row())[0] == "same"
 
 

@@ -102,7 +102,9 @@ MADE = {
     "compare.txt": lambda: on_paper(comparison(compared())),
     "compare.md": lambda: comparison_markdown(compared(), Path("out/both sides.html")),
     "compare.xml": lambda: comparison_junit(compared()),
-    "history.txt": lambda: on_paper(history_text(three()[0], [t for t in history(three()[1], Policy()) if t.steps])),
+    "history.txt": lambda: on_paper(
+        history_text(three()[0], [t for t in history(three()[1], Policy()) if t.steps]),
+    ),
 }
 
 

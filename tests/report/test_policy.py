@@ -128,7 +128,12 @@ def test_changed_flags_are_compared_only_where_the_policy_says_so(tmp_path: Path
 
 @pytest.mark.parametrize(
     ("when", "machine", "verdict"),
-    [("never", "A", None), ("same-machine", "A", "worse"), ("same-machine", "B", None), ("always", "B", "worse")],
+    [
+        ("never", "A", None),
+        ("same-machine", "A", "worse"),
+        ("same-machine", "B", None),
+        ("always", "B", "worse"),
+    ],
 )
 def test_timings_compare_by_their_own_rule(tmp_path: Path, when: str, machine: str, verdict: str | None) -> None:
     given = policy(tmp_path, f"[timings]\ncompare = '{when}'\nratio = 2")

@@ -15,7 +15,14 @@ from heavytop.harness.rows import computed
 from heavytop.measure.rounding_bound import RoundingBound
 from heavytop.measure.rounding_noise import some_of
 from heavytop.records import Against, Data, Metric, Quantity, Row, Series
-from heavytop.report.compare.noise import Policy, Rule, apart, noisier, of_starts, reaches_further
+from heavytop.report.compare.noise import (
+    Policy,
+    Rule,
+    apart,
+    noisier,
+    of_starts,
+    reaches_further,
+)
 from heavytop.top.amplification import FOLLOWED, amplification
 from heavytop.top.equations import HEAVY_TOP, Parameters
 from support.reports import compare, replace
@@ -225,7 +232,10 @@ def test_a_repair_is_not_worse_for_its_noise(name: str) -> None:
         assert judged(before, after)[0] in ("same", "better")
         assert not marked_worse(report(before), report(after))
     # where value and band together exceed those of the baseline it is noisier
-    assert judged(one("6.3e-12", 0.0022, name), one("6.2e-12", 0.47, name)) == ("worse", "noise: 0.0022 → 0.47 decades")
+    assert judged(one("6.3e-12", 0.0022, name), one("6.2e-12", 0.47, name)) == (
+        "worse",
+        "noise: 0.0022 → 0.47 decades",
+    )
 
 
 def test_what_a_value_gained_its_noise_may_take_up_to_the_allowed_loss() -> None:

@@ -35,7 +35,10 @@ def row(**changes: object) -> Row:
         time_reached="1000",
         steps=1600,
         finite=True,
-        metrics={"drift_energy_max": replace(error("3e-15"), band=0.2), "solution_error_relative_max": error("1e-10")},
+        metrics={
+            "drift_energy_max": replace(error("3e-15"), band=0.2),
+            "solution_error_relative_max": error("1e-10"),
+        },
         measure="drift",
         measured="computed: heyoka in double",
         against="known: closed form: Euler-Poinsot",

@@ -56,7 +56,11 @@ def turning_over(part: str, until: str) -> tuple[HeavyTop, State, Fraction]:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("top", "start", "horizon"),
-    [(CASES["kovalevskaya"].top, CASES["kovalevskaya"].start, Fraction(-9)), drawn(1), turning_over("1e-3", "2.5")],
+    [
+        (CASES["kovalevskaya"].top, CASES["kovalevskaya"].start, Fraction(-9)),
+        drawn(1),
+        turning_over("1e-3", "2.5"),
+    ],
 )
 def test_it_is_that_of_runs_from_states_changed_at_any_time(top: HeavyTop, start: State, horizon: Fraction) -> None:
     count, every, small = (96, 4, Fraction(1, 10**30)) if top.inertia == FLIPS else (60, 10, Fraction(1, 10**20))

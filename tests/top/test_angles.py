@@ -9,7 +9,14 @@ import sympy
 from heavytop.exact.flint.balls import FUNCTIONS, ball, working_precision
 from heavytop.measure.attitude_error import attitude_angle
 from heavytop.precision import cross, dot
-from heavytop.top.attitude import attitude_from_angles, euler_angles, gamma_from_angles, perpendicular, rows_of, unwrap
+from heavytop.top.attitude import (
+    attitude_from_angles,
+    euler_angles,
+    gamma_from_angles,
+    perpendicular,
+    rows_of,
+    unwrap,
+)
 from support.helpers import unit_vector
 
 

@@ -459,7 +459,10 @@ READ: dict[str, tuple[tuple[str, str | bytes], str]] = {
     "no gravity": (in_mjcf(BALL, '<option><flag gravity="disable"/></option>'), "0.1 0 0.2 2 0.03 0.05 0.04 0"),
     "degrees": (in_sdf('degrees="1"', "90 90 0"), "0.1 0 0.2 2 0.05 0.04 0.03 9.81"),
     "ball": (in_sdf(joint=JOINT.format("arm", "")), "0.1 0 0.7 2 0.03 0.05 0.04 9.81"),
-    "ball in the model": (in_sdf(joint=JOINT.format("arm", 'relative_to="f"')), "0.1 0 1.7 2 0.03 0.05 0.04 9.81"),
+    "ball in the model": (
+        in_sdf(joint=JOINT.format("arm", 'relative_to="f"')),
+        "0.1 0 1.7 2 0.03 0.05 0.04 9.81",
+    ),
     "ball of a frame": (in_sdf(joint=JOINT.format("g", "")), "-0.9 0 0.7 2 0.03 0.05 0.04 9.81"),
     "moon": (in_sdf(gravity="<gravity>0 0 -1.62</gravity>"), "0.1 0 0.2 2 0.03 0.05 0.04 1.62"),
     "world": (in_sdf(gravity="<gui/>"), "0.1 0 0.2 2 0.03 0.05 0.04 9.8"),

@@ -176,7 +176,10 @@ def test_sums_of_inverse_functions_are_what_they_are_and_not_off_by_pi(x, given,
 
 def test_a_sum_that_jumps_inside_the_domain_proves_nothing():
     """2 atan t = atan(2 t/(1 − t²)) for |t| < 1 only; the samples lie there."""
-    for spin, expected in (("2*atan(t) - atan(2*t/(1 - t^2))", False), ("2*atan(t) - 2*asin(t/sqrt(1 + t^2))", True)):
+    for spin, expected in (
+        ("2*atan(t) - atan(2*t/(1 - t^2))", False),
+        ("2*atan(t) - 2*asin(t/sqrt(1 + t^2))", True),
+    ):
         assert holds(upright(f"1 + {spin}", top("1 1 2", "0 0 3"), times=["1/3"])) is expected
 
 

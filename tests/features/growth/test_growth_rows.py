@@ -202,9 +202,21 @@ def test_the_laws_are_said_in_words(tmp_path: Path) -> None:
     ("cases", "run", "message"),
     [
         ('"euler"', 'precision = "double", horizon = "0"', "horizon"),
-        ('"euler"', 'precision = "double", horizon = "10", starts = 0', "starts must be from 1 to 100000; got 0"),
-        ('"euler"', 'precision = "double", horizon = "10", samples = 1', "samples must be from 4 to 1000; got 1"),
-        ('"euler"', 'precision = "double", horizon = "10", decades = 99', "decades must be from 1 to 12; got 99"),
+        (
+            '"euler"',
+            'precision = "double", horizon = "10", starts = 0',
+            "starts must be from 1 to 100000; got 0",
+        ),
+        (
+            '"euler"',
+            'precision = "double", horizon = "10", samples = 1',
+            "samples must be from 4 to 1000; got 1",
+        ),
+        (
+            '"euler"',
+            'precision = "double", horizon = "10", decades = 99',
+            "decades must be from 1 to 12; got 99",
+        ),
         ('"euler"', 'precision = "double", horizon = "10", tolerance = "-1"', "tolerance"),
         ('"euler"', 'precision = "double", horizon = "10", bias = "x"', "not a finite number"),
         (

@@ -122,7 +122,10 @@ def later_ephemeris() -> str:
 
 FORMS: dict[str, tuple[str, Callable[[], str]]] = {
     "modified Rodrigues parameters": ("csv", lambda: HEAD + "t,sigma1,sigma2,sigma3\n" + rows(TIMES, mrp())),
-    "rotation vector": ("csv", lambda: HEAD + "# attitude: rotation vector\nt,rx,ry,rz\n" + rows(TIMES, vectors())),
+    "rotation vector": (
+        "csv",
+        lambda: HEAD + "# attitude: rotation vector\nt,rx,ry,rz\n" + rows(TIMES, vectors()),
+    ),
     "MuJoCo, free joint": ("csv", lambda: mujoco("free")),
     "MuJoCo, ball joint": ("csv", lambda: mujoco("ball")),
     "TUM": ("txt", lambda: tum(True)),

@@ -224,11 +224,11 @@ def test_a_case_without_any_error_is_drawn_empty() -> None:
 
 def test_who_is_fastest_at_1e_10_opens_the_page() -> None:
     assert fastest(ALL) == Headline(
-        "heyoka double is the fastest at error 1e-10 on top/T=9: 4.5 times as fast as cyrk:DOP853."
+        "heyoka double is the fastest at error 1e-10 on top/T=9: 4.5 times as fast as cyrk:DOP853.",
     )
     slow = [*OURS, row("fast:x tolerance=1", -11, 0.5)]
     assert fastest(slow) == Headline(
-        "fast:x is the fastest at error 1e-10 on top/T=9: 4.0 times as fast as heyoka double."
+        "fast:x is the fastest at error 1e-10 on top/T=9: 4.0 times as fast as heyoka double.",
     )
     # each is named with the motions that it wins, and is compared with the next of these alone
     other = [row(f"{name} tolerance=1", -11, seconds, case="b") for name, seconds in (("heyoka", 1.0), ("fast:x", 3.0))]
