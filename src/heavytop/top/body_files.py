@@ -789,8 +789,9 @@ _USD = re.compile(rf"(?:physics|physxRigidBody):({'|'.join(_USD_NAMES)})\s*=\s*(
 
 def _usd(text: str) -> Iterator[Link]:
     """Prims of USD as text that have a mass and a diagonal inertia; by their names."""
-    text = re.sub(r"(?s)#[^\n]*|/\*.*?\*/", "", text)
-    _require_spelt("USD", re.findall(r"(\w+)\s*=", text), (*_USD_NAMES, *_STAGE))
+    text = re.sub(r'(?s)("[^"\n]*")|#[^\n]*|/\*.*?\*/', r"\1", text)
+    named = re.findall(r"(?m)(?:^\s*|\bphysics:|\bphysxRigidBody:)(\w+)\s*=", text)
+    _require_spelt("USD", named, (*_USD_NAMES, *_STAGE))
     units = {key: exact(value) for key, value in re.findall(rf"\b({'|'.join(_STAGE)})\s*=\s*([.\d][-+.\deE]*)", text)}
     starts = [*_PRIM.finditer(text)]
     for index, prim in enumerate(starts):

@@ -470,7 +470,10 @@ READ: dict[str, tuple[tuple[str, str | bytes], str]] = {
         in_sdf(gravity="<physics><gravity>0 0 -1.62</gravity></physics>"),
         "0.1 0 0.2 2 0.03 0.05 0.04 1.62",
     ),
-    "moon in USD": (("usda", SCENE.format("162", "physics:centerOfMass")), "0.1 0 0.2 2 0.03 0.05 0.04 1.62"),
+    "moon in USD, beside names of other programs": (
+        ("usda", SCENE.format('162\n string paths = "/s/*/a"', "float user:Mass = 3\n physics:centerOfMass")),
+        "0.1 0 0.2 2 0.03 0.05 0.04 1.62",
+    ),
     "earth in USD": (("usda", SCENE.format("-inf", "physics:centerOfMass")), "0.1 0 0.2 2 0.03 0.05 0.04 9.81"),
     "no gravity in USD": (
         ("usda", SCENE.format("162", "physxRigidBody:disableGravity = 1\n physics:centerOfMass")),

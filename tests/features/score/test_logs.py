@@ -516,7 +516,7 @@ def test_stamps_of_a_start_that_is_given_are_counted_from_it(tmp_path: Path) -> 
 def test_instants_of_a_calendar_are_times_over_a_leap_second(tmp_path: Path) -> None:
     stamps = [*(f"59.{tenth}" for tenth in range(5, 10)), *(f"60.{tenth}" for tenth in range(6))]
     lines = [f"2016-12-31 23:59:{s}Z,{row}" for s, row in zip(stamps, rows(quaternions()).splitlines(), strict=True)]
-    path, names = tmp_path / "log.csv", "timestamp,qw,qx,qy,qz\n"
+    path, names = tmp_path / "log.csv", "timestamp [ms],qw,qx,qy,qz\n"
     assert digits(path, HEAD + names + "\n".join(lines)) > 13
     lines[2:] = [line.replace("2016-12-31 23", "2017-01-01 00").replace("Z", "+01:00") for line in lines[2:]]
     assert digits(path, HEAD + names + "\n".join(lines)) > 13

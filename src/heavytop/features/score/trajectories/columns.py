@@ -462,7 +462,8 @@ def columns(document: Mapping[str, Any], convention: Convention) -> ColumnTable:
     """
     table = _of_table(document, convention) if "header" in document else _of_lists(document, convention)
     if not table.values:
-        raise InputError("No column describes the motion.", REMEDY)
+        what = "column" if "header" in document else "key, such as states,"
+        raise InputError(f"No {what} describes the motion.", REMEDY)
     if "euler" in table.values and not convention.sequence:
         raise InputError("The Euler angles have no sequence.", 'Give sequence, such as "ZXZ" or "ZYX".')
     return table
@@ -585,8 +586,8 @@ def _flat(row: Any, width: int, what: str) -> list[Any]:
     if isinstance(row, list) and width == 9 and len(row) == 3 and all(isinstance(part, list) for part in row):
         row = [value for part in row for value in part]
     if not isinstance(row, list) or len(row) != width:
-        has = plural(len(row), "number") if isinstance(row, list) else "no list"
-        raise InputError(f"{what} has {has}, not {width}.", f"Give {width} numbers.")
+        has = f"has {plural(len(row), 'number')}, not {width}" if isinstance(row, list) else "is not a list"
+        raise InputError(f"{what} {has}.", f"Give {width} numbers.")
     return row
 
 

@@ -165,6 +165,7 @@ def with_one_time(
     words = [name.partition(" ")[0].lower() for name in plain]
     for place, word in enumerate(words):
         if word in _COUNTED and _INSTANT.match(cells[0][place]):
+            plain[place] = word  # whatever the unit
             for row in cells:
                 row[place] = decimal_text(_epoch(row[place].replace(" ", "T")), 40)
         if word in _COUNTED:
