@@ -78,7 +78,7 @@ def test_a_table_of_another_program_is_read_as_it_was_meant(text: str | bytes, t
 
 def test_hexadecimal_tables_and_columns_without_a_header_are_read(tmp_path: Path) -> None:
     rows = [[float(t).hex(), *(float(v).hex() for v in s)] for t, s in zip(TIMES, STATES, strict=True)]
-    given = scored(tmp_path, "\n".join(" ".join(row) for row in rows), "a.dat")
+    given = scored(tmp_path, "\n".join(["# t w1 ... g3", *map(" ".join, rows)]), "a.dat")
     assert given.notes == ("columns without a header, read as t omega1 omega2 omega3 gamma1 gamma2 gamma3",)
     np.testing.assert_array_equal(np.array(given.states, float), STATES)
 

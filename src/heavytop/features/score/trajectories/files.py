@@ -253,7 +253,8 @@ def _is_header(names: list[str], width: int) -> bool:
     except InputError:  # of a sentence, unless these are as many as the columns
         return len(names) == width
     has_time = header.time is not None or names[:1] == ["%time"]
-    return not header.missing or (has_time and bool(header.places) and (not header.others or len(names) == width > 2))
+    whole = not header.missing and len(header.places["gamma"]) == 3
+    return whole or (has_time and bool(header.places) and (not header.others or len(names) == width > 2))
 
 
 def _split(body: list[str], lines: list[int], separator: str | None, width: int) -> list[list[str]]:
