@@ -82,7 +82,13 @@ def test_what_is_wrong_is_refuted_where_it_is_wrong(part: dict[str, str], first:
 
 
 @pytest.mark.parametrize(
-    ("psi", "verdict"), [("L*(u2 - u)/(1 - u^2)", "holds"), ("L*(u2 + u)/(1 - u^2)", "refuted"), ("u", "refuted")]
+    ("psi", "verdict"),
+    [
+        ("L*(u2 - u)/(1 - u^2)", "holds"),
+        ("L*(u2 + u)/(1 - u^2)", "refuted"),
+        ("u", "refuted"),
+        ("L*(u2 - sqrt(u^2))/(1 - u^2)", "undecided"),  # true: u > 0 where it moves
+    ],
 )
 def test_rates_of_angles_are_claims_by_themselves(psi: str, verdict: str) -> None:
     bare = dict.fromkeys(("reduced", "value", "psi"))
@@ -139,6 +145,10 @@ def test_a_function_of_time_is_smooth_and_defined_from_its_start(value: str, dom
     assert audited(CIRCLE | {"domain": domain, "component": CIRCLE["component"] | {"value": value}}).verdict == verdict
 
 
+# u² + 2, which is no rational function as written
+_HIDDEN = "(sqrt((u^2 + 2)*(u^2 + 3))*sqrt(u^2 + 2)/sqrt(u^2 + 3))"
+
+
 @pytest.mark.parametrize(
     ("quantity", "integrand", "verdict"),
     [
@@ -147,7 +157,13 @@ def test_a_function_of_time_is_smooth_and_defined_from_its_start(value: str, dom
         ("Omega1", "sqrt(1/(1 - u))*sqrt(1/(1 + u))", "holds"),
         ("Omega1", "sqrt(1/(u - 1))*sqrt(1/(-1 - u))", "undecided"),
         ("Omega1", "sqrt(u^2)/(u*sqrt(1 - u^2))", "undecided"),  # changes its sign at u = 0
+        ("Omega1", "sqrt(4*u^2 - 4*u + 1)/((2*u - 1)*sqrt(1 - u^2))", "undecided"),  # at u = 1/2
+        ("Omega1", f"sqrt({_HIDDEN}^2 - 9/2*{_HIDDEN} + 81/16)/((u^2 - 1/4)*sqrt(1 - u^2))", "undecided"),
+        ("Omega1", "sqrt(4*u^2 - 4*u + 1)/((2*u - 1 - 2*a)*sqrt(1 - u^2))", "undecided"),  # a is 0
         ("Omega1", "sqrt(-1 - u^2)/(sqrt(1 + u^2)*sqrt(u^2 - 1))", "undecided"),
+        ("Omega1", "1/sqrt(1 - u^2) + 0*log(g^2*(1 - u))", "undecided"),  # not defined where g = 0
+        ("Omega1", "sqrt(u + 2)/(sqrt(u + 2)*sqrt(1 - u^2))", "holds"),
+        ("Omega1", "sqrt(u + 1/2)/(sqrt(u + 1/2)*sqrt(1 - u^2))", "undecided"),
         ("Omega1", "1/sqrt(1 - u^2) + 0*log(u - 5)", "undecided"),
         ("exp(Omega1)", "1/(u*sqrt(1 - log(u)^2))", "holds"),
         ("exp(Omega1)", "1/(u*sqrt(1 - log(u)^2)) + 0*log(u - 5)", "undecided"),
@@ -156,7 +172,8 @@ def test_a_function_of_time_is_smooth_and_defined_from_its_start(value: str, dom
 def test_an_integrand_is_real_where_the_component_moves(quantity: str, integrand: str, verdict: str) -> None:
     component = {"quantity": quantity, "constants": ["Omega3"]}
     table = CIRCLE | {"component": component, "quadrature": {"variable": "u", "integrand": integrand}}
-    assert audited(table).verdict == verdict
+    parameters = {"parameters": {"g": "1"}, "definitions": {"a": "sqrt(3 + 2*sqrt(2)) - 1 - sqrt(2)"}}
+    assert audited(table | parameters).verdict == verdict
 
 
 @pytest.mark.parametrize(
@@ -166,6 +183,7 @@ def test_an_integrand_is_real_where_the_component_moves(quantity: str, integrand
         ("atan(u/sqrt(1 - u^2))", "holds"),
         ("-atan(sqrt(1 - u^2)/u)", "undecided"),  # jumps at u = 0
         ("asin(2*u*sqrt(1 - u^2))/2", "undecided"),  # decreases beyond u = 1/√2
+        ("asin(2*u^2 - 1)/2", "undecided"),  # decreases before u = 0
     ],
 )
 def test_the_clock_of_a_component_neither_jumps_nor_turns(time: str, verdict: str) -> None:
@@ -335,19 +353,22 @@ def test_the_start_gives_the_gyrostats_energy_to_a_gyrostat() -> None:
 @pytest.mark.parametrize(
     ("where", "start", "reduced", "value", "verdict"),
     [
-        (["Omega3 - 2"], True, "1 - u^2", "cos(t)", "holds"),
-        (["Omega3 - 10"], True, "25*(1 - u^2)", "cos(5*t)", "refuted"),  # not where it starts
-        (["Omega3 - 2", "Omega1^2 + Omega2^2 - 1"], False, "1 - u^2", None, "holds"),
-        (["Omega3 - 2", "Omega3 - 10"], False, "25*(1 - u^2)", None, "undecided"),
-        (["Omega3 - 2", "Omega1^2 + Omega2^2 + 1"], False, "-1 - u^2", None, "undecided"),
+        (["Omega3 - 2"], "2", "1 - u^2", "cos(t)", "holds"),
+        (["Omega3 - 2"], "n", "1 - u^2", None, "undecided"),  # on it for n = 2 alone
+        (["Omega3 - 10"], "2", "25*(1 - u^2)", "cos(5*t)", "refuted"),  # not where it starts
+        (["Omega3 - 2", "Omega1^2 + Omega2^2 - 1"], "", "1 - u^2", None, "holds"),
+        (["Omega3 - 2", "Omega3 - 10"], "", "25*(1 - u^2)", None, "undecided"),
+        (["Omega3 - 2", "Omega1^2 + Omega2^2 + 1"], "", "-1 - u^2", None, "undecided"),
+        (["Omega1", "Omega2"], "", "u^2", None, "undecided"),  # true of u = 0
     ],
 )
 def test_there_is_a_state_on_the_conditions(
-    where: list[str], start: bool, reduced: str, value: str | None, verdict: str
+    where: list[str], start: str, reduced: str, value: str | None, verdict: str
 ) -> None:
     """Anything follows from conditions that exclude each other, and falsehoods from one that the start is not on."""
     component = {"quantity": "Omega1", "where": where, "reduced": reduced, "value": value, "constants": ["Omega3"]}
-    table = {"start": CIRCLE["start"] if start else None, "component": {k: v for k, v in component.items() if v}}
+    begin = {"omega": ["1", "0", start], "gamma": ["0", "0", "1"]} if start else None
+    table = {"start": begin, "component": {k: v for k, v in component.items() if v}, "parameters": {"n": "2"}}
     assert audited(CIRCLE | table).verdict == verdict
 
 

@@ -34,7 +34,7 @@ from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.prover import shortest
 from heavytop.features.claims.algebra.rational import forces_zero
 from heavytop.features.claims.algebra.reader import Formula, parse, symbol
-from heavytop.features.claims.algebra.ring import Unprovable
+from heavytop.features.claims.algebra.ring import Unprovable, where_provable
 from heavytop.features.claims.algebra.signs import PLUS
 from heavytop.features.claims.algebra.statement import (
     AFTER,
@@ -194,8 +194,8 @@ class UserComponent(UserIntegral):
         """What remains to be proven of a condition on u for it to hold wherever u moves, but for single values of u.
 
         There f(u) = u'^2 > 0, and R = f/c^2 has its sign.  A polynomial R with f = R g keeps its sign at the start: u
-        turns or rests at a zero of R.  Where R is 0 at the start, it takes the sign of g.  A divisor must not be 0 for
-        all u.
+        turns or rests at a zero of R.  Where R is 0 at the start, it takes the sign of g.  A divisor, or the argument
+        of a logarithm, must not be 0 for all u.
         """
         u, radicand = self._u, need.expression
         if u not in radicand.free_symbols:
@@ -209,21 +209,30 @@ class UserComponent(UserIntegral):
                     yield Need(ConditionKind.NONZERO, base)
             return
         radicand = sympy.prod(sympy.fraction(sympy.together(radicand)))
-        cofactor = sympy.cancel(f / radicand)
-        if cofactor.is_rational_function(u) and _is_square(cofactor):
-            return
-        is_continuous = self.start and not self.quantity.expression.has(sympy.atan2)
-        is_polynomial = is_continuous and radicand.is_polynomial(u) and cofactor.is_rational_function(u)
-        if not is_polynomial or u in sympy.gcd(radicand, sympy.denom(cofactor)).free_symbols:
+        if need.kind is ConditionKind.POSITIVE and not for_no_parameters(radicand, self.setting.assumptions(0), ()):
             yield need
-            return
-        yield Need(ConditionKind.POSITIVE, self._at_begin(radicand, cofactor))
+        elif not self._has_sign_of(radicand, f):
+            keeps_sign = self._is_continuous and self._divides(radicand, f)
+            yield Need(ConditionKind.POSITIVE, self._at_begin(radicand, f)) if keeps_sign else need
 
-    def _at_begin(self, radicand: sympy.Expr, cofactor: sympy.Expr) -> sympy.Expr:
-        """An expression with the sign that the radicand has after the start."""
+    @property
+    def _is_continuous(self) -> bool:
+        return bool(self.start) and not self.quantity.expression.has(sympy.atan2)
+
+    @where_provable(False)
+    def _has_sign_of(self, radicand: sympy.Expr, f: sympy.Expr) -> bool:
+        """Whether f(u) > 0, with the signs of its factors, implies that an expression is >= 0."""
+        cofactor = _cofactor(radicand, f)
+        if cofactor.is_rational_function(self._u) and _is_square(cofactor):
+            return True
+        field = Field(self.setting.assumptions(0, facts=(f, *self._signed_factors(f))), [radicand])
+        return field.tower.sign(field.enter(radicand)).value > 0
+
+    def _at_begin(self, p: sympy.Expr, f: sympy.Expr) -> sympy.Expr:
+        """An expression with the sign that a divisor p of f has after the start."""
         begin = {self._u: self._at_start(self.quantity.expression)}
-        at_start = sympy.factor(radicand.xreplace(begin))
-        return at_start if at_start != 0 else sympy.factor(cofactor.xreplace(begin))
+        at_start = sympy.factor(p.xreplace(begin))
+        return at_start if at_start != 0 else sympy.factor(_cofactor(p, f).xreplace(begin))
 
     def _of(self, name: str, table: QuadratureTable | ComponentTable | None) -> Formula | None:
         """A formula of a table, which may contain t in [component]; None where absent."""
@@ -260,17 +269,18 @@ class UserComponent(UserIntegral):
         return (about.name,) if verdict_of(rows) == "holds" else ()
 
     def _moves(self, system: System, sample: Mapping[sympy.Symbol, Fraction]) -> bool:
-        """Whether u is not constant along the motion from the start."""
+        """Whether u is not constant along the motion from the start; without one, from a state on the conditions."""
         rates = self._rates(system)[1:]
-        zeros = [is_exactly_zero(self._at_start(e), sample) for e in rates] if self.start else [False]
-        return any(zero is False for zero in zeros)
+        if self.start:
+            return any(is_exactly_zero(self._at_start(e), sample) is False for e in rates)
+        states = (state for state in self.at_states.samples if sample.items() <= state.items())
+        on_conditions = (state for state in states if _is_at(state, self.at_states.relations))
+        return any(is_exactly_zero(e, state) is False for state in on_conditions for e in rates)
 
     def _is_on_conditions(self, sample: Mapping[sympy.Symbol, Fraction]) -> bool:
-        """Whether the start lies on the conditions at a sample; without a start, whether a known state does."""
-        if self.start:
-            return _is_at(sample, map(self._at_start, (*(part.expression for part in self.where), OFF_SPHERE)))
-        states = (state for state in self.at_states.samples if sample.items() <= state.items())
-        return any(_is_at(state, self.at_states.relations) for state in states)
+        """Whether the start, if any, lies on the conditions at a sample."""
+        zeros = (*(part.expression for part in self.where), OFF_SPHERE)
+        return not self.start or _is_at(sample, map(self._at_start, zeros))
 
     def _reduced(self, system: System) -> tuple[list[Statement], list[Statement]]:
         """u'² = f(u), u'' = f'(u)/2 and the rates of the angles, where the first integrals have their values."""
@@ -286,8 +296,6 @@ class UserComponent(UserIntegral):
             f, needs = self._square.expression, self._square.needs
             claims.append(("reduced", 1, f, slope**2, one, "u'^2 = f(u)", needs))
             claims.append(("reduced", 2, sympy.diff(f, u) / 2, rate(slope), one, "u'' = f'(u)/2", needs))
-            # between the values of u on its way two functions may differ that agree on it
-            moved = ALL if f.is_rational_function(u) else replace(ALL, points=self._shortly_after(system))
             in_u += self._clock(f, system)
         for index, name in enumerate(_ANGLES, 1):
             claimed = self._of(name, self.content.quadrature)
@@ -314,7 +322,9 @@ class UserComponent(UserIntegral):
                 at_samples = _without(base, *STATE) | _nonzero(through[2])
                 needs |= at_samples
                 formulas = Formulas((u,), needs, pole=pole, sampled=at_samples if equation == "reduced" else needs)
-                domain = moved if equation == "reduced" else ALL
+                # beyond the way of u two functions may differ that agree on it
+                is_rational = of_u.is_rational_function(u)
+                domain = ALL if is_rational else replace(ALL, points=self._shortly_after(system))
                 in_u.append(Statement(equation, index, "smooth", domain, residual, text, formulas))
             elif index == 1 or equation == "rate":
                 # sin θ is the root of 1 - γ3² in a formula, and that of γ1² + γ2² in the rate
@@ -354,39 +364,45 @@ class UserComponent(UserIntegral):
     def _clock(self, f: sympy.Expr, system: System) -> Iterator[Statement]:
         """F is continuous and F' real and of one sign where u moves: f(u) > 0 there, as are radicands that divide f.
 
-        That they are real is a condition of the reduced equation, which a state refutes where they are not.
+        That they are real is a condition of the reduced equation, which a state refutes where they are not; so are
+        arguments of logarithms, which are > 0.
         """
         clock, u, table = self._quadrature, self._u, self.content.quadrature
-        if clock is None or table is None:
+        if clock is None or table is None or self._square is None:
             return
         slope = clock.expression if table.time is None else rate_along({u: sympy.Integer(1)})(clock.expression)
         factors = (factor.as_base_exp() for factor in sympy.Mul.make_args(slope))
         has_one_sign = all(n.q == 2 or sign_of(p).strict or self._divides(p, f) for p, n in factors)
         values = () if has_one_sign and table.time is None else (slope, 1 / slope)
         values += () if table.time is None else (clock.expression,)
-        positive = (need.expression for need in sorted(clock.needs, key=str) if need.kind is not ConditionKind.NONZERO)
-        facts = (f, *(radicand for radicand in positive if self._divides(radicand, f)), *self._signed_factors(f))
+        proven = {need.expression for need in self._square.needs if need.kind is ConditionKind.POSITIVE}
+        real = (need.expression for need in sorted(clock.needs, key=str) if need.kind is not ConditionKind.NONZERO)
+        facts = (f, *(e for e in real if e in proven or self._divides(e, f)), *self._signed_factors(f))
         domain = Domain("f(u) > 0", 0, self._shortly_after(system), f"{u} is the component", facts)
         text = "t = F(u) is continuous, and F' is real and keeps its sign"
         yield Statement("time", 1, "smooth", domain, sympy.Integer(0), text, Formulas(values, sampled=clock.needs))
 
     def _signed_factors(self, f: sympy.Expr) -> Iterator[sympy.Expr]:
         """The factors of a rational f(u) that have a known sign at the start, which they keep, times that sign."""
-        if not self.start or not f.is_rational_function(self._u):
+        if not self._is_continuous or not f.is_rational_function(self._u):
             return
         for factor in sympy.Mul.make_args(sympy.factor(sympy.numer(sympy.together(f)))):
             p, _ = factor.as_base_exp()
-            if self._u in p.free_symbols:
+            if self._u in p.free_symbols and self._divides(p, f):
                 with suppress(Unprovable):
-                    begin = self._at_begin(p, sympy.cancel(f / p))
+                    begin = self._at_begin(p, f)
                     field = Field(self.setting.assumptions(0), [begin])
                     sign = field.tower.sign(field.enter(begin))
                     yield from [sign.value * p] if sign.value and sign.strict else []
 
     def _divides(self, p: sympy.Expr, f: sympy.Expr) -> bool:
         """Whether a polynomial in u, or a constant, is 0 only where f is: so it keeps its sign where u moves."""
-        cofactor = sympy.cancel(f / p)
-        return p.is_polynomial(self._u) and self._u not in sympy.gcd(p, sympy.denom(cofactor)).free_symbols
+        cofactor = _cofactor(p, f)
+        below = sympy.denom(cofactor)
+        is_finite = cofactor.is_rational_function(self._u) and (
+            self._u not in below.free_symbols or sign_of(below).strict
+        )
+        return is_finite and p.is_polynomial(self._u)
 
     def _rates(self, system: System) -> tuple[sympy.Expr, sympy.Expr, sympy.Expr]:
         """u, u' and u'' on the state."""
@@ -429,10 +445,20 @@ class UserComponent(UserIntegral):
 
     def _in_time(self, system: System) -> list[Statement]:
         """The two equations of the function of time, its start, and the rates of the angles along it."""
+        domain = _FROM_START[self.content.domain]
+        at_start = replace(domain, points=(Fraction(0),)), Formulas(needs=needs_of(self.start))
+
+        def begins(index: int, residual: sympy.Expr, text: str) -> Statement:
+            return Statement("start", index, "smooth", at_start[0], residual, f"{text} at t = 0", at_start[1])
+
+        zeros = [part.expression for part in self.where[: len(self._component.where)]] if self.start else []
+        on_start = {OFF_SPHERE: "|gamma|^2 = 1"} if self.start else {}
+        on_start |= {part: f"{written(str(part))} = 0" for part in zeros}
+        on_conditions = [begins(n, self._at_start(part), text) for n, (part, text) in enumerate(on_start.items(), 3)]
         value = self._of("value", self._component)
         if value is None or self._square is None:
-            return []
-        u, f, domain = self._u, self._square.expression, _FROM_START[self.content.domain]
+            return on_conditions
+        u, f = self._u, self._square.expression
         c = shortest(value.expression, setting_of(self.context, TIME), domain)
         first, second = _IN_TIME(c), _IN_TIME(_IN_TIME(c))
         # one solution begins with u and u' if u' is continuous, and if f' has a continuous derivative
@@ -441,22 +467,17 @@ class UserComponent(UserIntegral):
         formulas = Formulas(regular, value.needs | along | self.context.needs)
 
         def made(equation: str, index: int, residual: sympy.Expr, text: str, extra: Formulas = formulas) -> Statement:
-            times = replace(domain, points=(Fraction(0),)) if equation == "start" else domain
-            return Statement(equation, index, "smooth", times, residual, text, extra)
+            return Statement(equation, index, "smooth", domain, residual, text, extra)
 
         equations = [
             made("component", 1, first**2 - f.xreplace({u: c}), "u'^2 = f(u) of the function of t"),
             made("component", 2, second - sympy.diff(f, u).xreplace({u: c}) / 2, "u'' = f'(u)/2 of the function of t"),
         ]
-        at_zero = Formulas(needs=needs_of(self.start))
         begin = ((c, self.quantity.expression), (first, self._rate(system)(self.quantity.expression)))
         for component, (ours, theirs) in enumerate(begin, 1):
             residual = at_values(ours, {TIME: sympy.Integer(0)}) - self._at_start(theirs)
-            equations.append(made("start", component, residual, f"u{chr(39) * (component - 1)} at t = 0", at_zero))
-        claimed_zero = [part.expression for part in self.where[: len(self._component.where)]]
-        on_start = {OFF_SPHERE: "|gamma|^2 = 1", **{part: f"{written(str(part))} = 0" for part in claimed_zero}}
-        for component, (part, text) in enumerate(on_start.items(), 3):
-            equations.append(made("start", component, self._at_start(part), f"{text} at t = 0", at_zero))
+            equations.append(begins(component, residual, f"u{chr(39) * (component - 1)}"))
+        equations += on_conditions
         for index, name in enumerate(_ANGLES, 1):
             angle, claimed = self._of(name, self._component), self._of(name, self.content.quadrature)
             if angle is not None:
@@ -468,6 +489,11 @@ class UserComponent(UserIntegral):
                     made("angle", index, residual, f"{name}' of {name}", Formulas((c, angle.expression), needs))
                 )
         return equations
+
+
+def _cofactor(p: sympy.Expr, f: sympy.Expr) -> sympy.Expr:
+    """f/p without their common factors."""
+    return sympy.factor(f) / sympy.factor(p)
 
 
 def _is_square(e: sympy.Expr) -> bool:
