@@ -145,6 +145,11 @@ def test_a_zero_of_higher_order_at_the_start_is_followed() -> None:
     start = ht.State((0, 0, 0), ("3/5", "4/5", 0))
     assert len(ht.events(PENDULUM, start, 4, "gamma1 = 3/5", digits=20)) == 0
     assert len(ht.events(PENDULUM, start, 4, "(gamma1 - 3/5)*omega3", digits=20)) == 0
+    # γ1 = d t − ..., d = 1e-12: a second zero right after the start, which no rounding hides as γ1(0) is exact
+    start = ht.State((0, "0.74999999999875", 1), (0, "3/5", "4/5"))
+    times = [floats(ht.events(TOP, start, "1/20", "gamma1", digits=digits)) for digits in (None, 16)]
+    assert len(times[0]) == 1
+    assert np.allclose(*times, rtol=1e-3, atol=0)
 
 
 @pytest.mark.parametrize(

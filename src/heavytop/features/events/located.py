@@ -137,8 +137,8 @@ def _native_time(time: Fraction, precision: Precision) -> Any:
 def _of_rational(function: EventFunction, pieces: Iterator[Piece], precision: Precision, order: int) -> Iterator[Found]:
     """Changes of sign of the numerator where the denominator is not 0.
 
-    order: of its zero at the exact start.  Rounding the start scatters such a zero, which is no event; up to
-    t = eps^(1/(order + 1)) of a step the function is below a rounding.
+    order: of its zero at the exact start.  Rounding the start scatters such a zero by a term eps t^k, which is no
+    event: up to t = eps^(1/(order + 1 - k)) of a step the function is below a rounding.
     """
     terms, below = terms_of(function.numerator), terms_of(function.denominator)
     used, zero = function.used(), fmpq_poly([0])
@@ -151,7 +151,8 @@ def _of_rational(function: EventFunction, pieces: Iterator[Piece], precision: Pr
         bits = precision.bits + _GUARD_BITS + (precision.bits if piece.began == 0 else 0)
         changes = [(refined(polynomial, c, bits), c.rising) for c in sign_changes(polynomial, piece.end, bits)]
         if order and piece.began == 0:
-            changes = [change for change in changes if change[0] > fmpq(1, 1 << precision.bits // (order + 1))]
+            scattered = order + 1 - next((k for k in range(order) if polynomial[k] != 0), order)
+            changes = [change for change in changes if change[0] > fmpq(1, 1 << precision.bits // scattered)]
         after = sign_after(polynomial)
         if before and after and before != after:
             # the two steps disagree at their common end by a rounding
