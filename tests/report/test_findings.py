@@ -7,6 +7,7 @@ from heavytop.precision import exact
 from heavytop.records import Against, Explained, Law, Row, Subject
 from heavytop.report.compare.findings import MOST
 from heavytop.report.compare.noise import Policy, Rule, Timings
+from heavytop.report.compare.verdicts import Verdict
 from heavytop.report.render.history import cells
 from support.report_helpers import error
 from support.reports import compare, history, replace
@@ -188,6 +189,8 @@ def test_a_row_that_failed_in_both_reports_is_the_same_and_said() -> None:
     assert found(pair, pair) == ["Nothing changed: 2 metrics are within the limits.", said]
     none = "1 row of mine:rk5 cannot be compared: no row of mine:rk5 has a number."
     assert found(pair[1:], pair[1:])[:2] == [none, said]
+    stopped = report(rk5(outcome="step_limit", time_reached="80", metrics={}))
+    assert compare(stopped, stopped, Policy(), list_same=False).tally == {Verdict.INCOMPARABLE: 1}
     worse = [replace(pair[0], metrics={"drift_energy_max": error("1")}), pair[1]]
     assert said in found(pair, worse)
 

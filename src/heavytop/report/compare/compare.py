@@ -111,15 +111,16 @@ def compare(
         candidate.rows.twins = baseline.rows
     rows = RowComparison(policy, kinds, timed, list_same, checked, same_machine and same_versions)
     unmatched = _UnmatchedRows(candidate.rows)
-    measured, unmeasured = set[str](), dict[str, tuple[int, Row]]()
+    measured, unmeasured = set[str](), dict[str, tuple[int, int, Row]]()
     for row in baseline.rows:
         if (match := unmatched.take(row)) is not None:
-            subject = row.key.subject
+            subject, same = row.key.subject, rows.same
+            findings = rows.compare(row, match)
             if row.metrics or match.metrics:
                 measured.add(subject.name)
             elif subject.what == "computed" and is_third_party(subject.name) and not rows.ignores(row):
-                unmeasured.setdefault(subject.name, (len(findings_by_row), match))
-            findings_by_row.append(changes.add(row, match, rows.compare(row, match)))
+                unmeasured.setdefault(subject.name, (len(findings_by_row), rows.same - same, match))
+            findings_by_row.append(changes.add(row, match, findings))
             if folders is not None and not rows.ignores(row):
                 motions.append(kind_of(row, kinds).join(row, match, folders, partial(rows.limits, row)))
         elif not rows.ignores(row):
@@ -131,12 +132,12 @@ def compare(
         else:
             findings = [Finding(row.identity, "", Verdict.MISSING, row.outcome, None, "the row is missing")]
         findings_by_row[index] = changes.add(row, match, findings)
-    for name, (index, row) in unmeasured.items():
+    for name, (index, counted, row) in unmeasured.items():
         if name not in measured and not any(f.verdict is not Verdict.SAME for f in findings_by_row[index]):
             cause = f"no row of {name} has a number"
             lacking = Finding(row.identity, "", Verdict.INCOMPARABLE, row.outcome, row.outcome, cause)
             findings_by_row[index] = changes.add(row, row, [lacking])
-            rows.same -= not list_same
+            rows.same -= counted
     for row in unmatched.left():
         if not rows.ignores(row):
             new = Finding(row.identity, "", Verdict.NEW, None, row.outcome)
