@@ -43,7 +43,8 @@ def part(name: str, budget: int, horizon: int) -> str:
     if hunt.found:
         lines += ["", "**Found**, beyond what that explains:", "", "```text", str(hunt), "```"]
     else:
-        lines += ["", "Nothing is beyond two decades of that. The worst:", ""]
+        worst = "The worst:" if a.worst else "The largest errors are of motions that lose all digits in any double."
+        lines += ["", f"Nothing is beyond two decades of that. {worst}", *[""] * bool(a.worst)]
         pairs = zip(worst_lines(a), a.worst, strict=True)
         lines += [f"- {text} `{data(m.motion)}`" for text, m in pairs]
     return "\n".join(lines)
