@@ -2,6 +2,7 @@
 
 import collections
 import math
+from time import process_time, thread_time
 
 import numpy
 import pytest
@@ -22,8 +23,9 @@ def test_every_power_is_recognised(kind: str) -> None:
 @pytest.mark.slow
 def test_the_interval_holds_the_exponent_in_95_of_100_trials() -> None:
     """Of every law, and in more trials: `validation/law_coverage.py`."""
-    rng = numpy.random.default_rng(11)
+    rng, other_threads = numpy.random.default_rng(11), process_time() - thread_time()
     laws = [law(Ensemble(TIMES, synthetic("walk", rng, 24), STEP)) for _ in range(60)]
+    assert process_time() - thread_time() - other_threads < 0.1  # those of BLAS wait for busy processors
     inside = sum(each.low <= EXPONENT["walk"] <= each.high for each in laws)
     assert 54 <= inside <= 59
     assert sum(each.growth == "t^0.5" for each in laws) >= 57

@@ -37,6 +37,8 @@ _DECIMALS = 6
 _RESAMPLES = 1000
 _ROUNDS = 3
 _SEED = 20261121
+_ONE_THREAD = 1 << 18
+"""Multiplications from which OpenBLAS uses several threads, which wait for busy processors."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +84,14 @@ def root_mean_square(values: Array) -> Array:
     return root
 
 
+def _product(rows: Array, columns: Array) -> Array:
+    """``rows @ columns``, for a vector or a matrix of columns, in this thread alone."""
+    if columns.ndim == 1:
+        return numpy.asarray(numpy.einsum("...i,i", rows, columns))
+    block = max(1, _ONE_THREAD // columns.size)
+    return numpy.concatenate([rows[i : i + block] @ columns for i in range(0, len(rows), block)])
+
+
 @cache
 def resampled(starts: int) -> Array:
     """Weights of the bootstrap, shape (resamples, starts); each row sums to 1.  Deterministic."""
@@ -98,7 +108,7 @@ def band(values: Array) -> float | None:
     if len(values) < FEWEST_STARTS or not numpy.isfinite(values).all() or numpy.count_nonzero(values) < len(values) / 2:
         return None
     squares = (values / values.max()) ** 2
-    low, high = _interval(numpy.log10(resampled(len(values)) @ squares) / 2, len(values))
+    low, high = _interval(numpy.log10(_product(resampled(len(values)), squares)) / 2, len(values))
     return float(high - low) / 2
 
 
@@ -156,7 +166,7 @@ def law(ensemble: Ensemble) -> Law:
     if fit is None:
         return unresolved
     growth, first, slope, (low, high), bend = fit
-    logs = numpy.log(rms[-1]) + numpy.log(resampled(starts) @ shares[:, -1]) / 2
+    logs = numpy.log(rms[-1]) + numpy.log(_product(resampled(starts), shares[:, -1])) / 2
     lower, upper = numpy.exp(_interval(logs, starts))
     bias, n, order = (upper**2 - lower**2) ** 0.5, times[-1] / ensemble.step, ensemble.accumulates
     return Law(
@@ -186,8 +196,8 @@ def _fit(x: Array, y: Array, weights: Array | None = None) -> tuple[Array, Array
     w = numpy.ones_like(x) if weights is None else weights
     centred = x - numpy.average(x, weights=w)
     deviations = y - numpy.average(y, axis=-1, weights=w)[..., numpy.newaxis]
-    slopes = deviations @ (w * centred) / (w @ centred**2)
-    return slopes, (deviations - slopes[..., numpy.newaxis] * centred) ** 2 @ w
+    slopes = _product(deviations, w * centred) / (w @ centred**2)
+    return slopes, _product((deviations - slopes[..., numpy.newaxis] * centred) ** 2, w)
 
 
 _Fit = tuple[Growth, float, float, Interval, Interval | None]
@@ -244,11 +254,12 @@ def _balanced(shares: Array, weights: Array) -> Array:
 
     weights: of the starts, shape (resamples, starts); each mean refers to the shares of its resample.
     """
-    mean = weights @ shares
+    mean = _product(weights, shares)
     # the mean of a start is relative to all: iterated with scaled starts, until large ones do not dominate
     for _ in range(_ROUNDS):
-        means = (1 / mean) @ shares.T
-        mean = numpy.divide(weights, means, out=numpy.zeros_like(means), where=means > 0) @ shares
+        means = _product(1 / mean, shares.T)
+        scaled = numpy.divide(weights, means, out=numpy.zeros_like(means), where=means > 0)
+        mean = _product(scaled, shares)
     logs: Array = numpy.log(mean) / 2
     return logs
 
@@ -257,13 +268,14 @@ def _exponential(times: Array, rms: Array, shares: Array) -> _Fit | None:
     if rms[-1] < rms[0] * 10**FEWEST_DECADES:
         return None
     weights, starts = numpy.gradient(times), len(shares)
-    drawn = resampled(starts) @ shares
+    drawn = _product(resampled(starts), shares)
     # a resample of few starts may be exactly 0
     logs = numpy.log(rms) + numpy.log(drawn[(drawn > 0).all(axis=1)]) / 2
     powers, power_residuals = _fit(numpy.log(times), logs, weights)
     _, exponential_residuals = _fit(times, logs, weights)
     centred = logs - numpy.average(logs, axis=-1, weights=weights)[:, numpy.newaxis]
-    better = (exponential_residuals < power_residuals) & (exponential_residuals < STRAIGHT * (centred**2 @ weights))
+    limits = numpy.minimum(power_residuals, STRAIGHT * _product(centred**2, weights))
+    better = exponential_residuals < limits
     if _interval(powers, starts)[0] <= CLASSES["t^2"] or better.mean() < 0.95:
         return None
     rates = finite_time_rates(times, numpy.sqrt(shares) * rms)
