@@ -172,10 +172,10 @@ def limit(value: Number | None, what: str) -> str | None:
 
 
 def flag(value: bool | None, what: str) -> bool | None:
-    """A bool, or None."""
-    if value is not None and not isinstance(value, bool):
+    """A bool, Python's or numpy's, or None."""
+    if type(value).__name__ not in ("NoneType", "bool", "bool_"):
         raise refusal(what, "a bool", quoted(value), "Give True or False.")
-    return value
+    return None if value is None else bool(value)
 
 
 _Call = TypeVar("_Call", bound=Callable[..., object])

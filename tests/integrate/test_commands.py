@@ -28,6 +28,7 @@ from heavytop.integrate.peers.double import double_peer
 from heavytop.integrate.registry import commands_in, named, of_callable
 from heavytop.precision import exact, number
 from heavytop.written_numbers import number as written
+from support import methods_with_memory as memory
 from support.helpers import judged
 
 PROGRAM = Path(__file__).parents[1] / "support" / "faulty_program.py"
@@ -77,6 +78,7 @@ FAILURES = {
     "talks on": "wrote more after 'done steps",
 }
 DIAGNOSED = {
+    "ignores its step": ("between steps", 'the step is ignored. Use it, or declare setting = "none".'),
     "six digits": ("digits", "States have 6 significant digits; double has 17."),
     "single precision": ("digits", "States have 24 bits; double has 53."),
     "wrong backwards": ("backwards", "steps backward in time are wrong"),
@@ -241,11 +243,21 @@ def test_one_process_serves_many_requests_and_the_next_row_begins_with_an_empty_
         (("mine", 4, print), {"systems": ["moon"]}, "Unknown system 'moon'"),
         (("mine", 4, print), {"precisions": ["doubel"]}, "Unknown precision 'doubel'"),
         (("mine", 4, print), {"systems": []}, "systems is empty"),
+        (("mine", 4, print), {"systems": 3}, "must be lists of names; got 3"),
+        (("", 4, print), {}, "name must be 1 to 200 printable characters; got ''"),
     ],
 )
 def test_what_a_callable_declares_is_read(arguments, options, cause: str) -> None:
     with pytest.raises(InputError, match=cause):
         double_peer(*arguments, **options)
+
+
+def test_what_a_callable_declares_may_be_numpys() -> None:
+    names = (name for name in np.array(["heavy_top"]))
+    solve = memory.solver(memory.METHODS["ab4"][0])
+    peer = double_peer(np.str_("mine"), 4, solve, np.str_("step"), systems=names, one_step=np.False_)
+    assert not peer.declared.one_step
+    assert registry.ready(of_callable(peer))(CASE.top, CASE.start, TIMES, DOUBLE).integrator == "mine"
 
 
 def test_what_a_program_declares_that_it_cannot_do_is_never_sent() -> None:

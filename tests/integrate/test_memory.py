@@ -213,13 +213,13 @@ def test_a_start_may_be_off_by_the_rounding_of_its_representation_and_a_run_to_0
 # Steps, counts, and what lies between steps.
 
 
-def dopri(between):
-    """SciPy's method of order 5 with a tolerance, and an interpolant of one's own."""
+def dopri(between, beyond=0.0):
+    """SciPy's method of order 5 with a tolerance, and an interpolant of one's own; it ends beyond the last time."""
     from scipy.integrate import RK45
 
     def solve(given):
-        control = {"rtol": max(given.setting, 3e-14), "atol": given.setting}
-        solver = RK45(lambda _, y: np.array(given.field(y.tolist())), 0.0, given.start, given.times[-1], **control)
+        control = {"rtol": max(given.setting, 3e-14), "atol": given.setting, "t_bound": given.times[-1] + beyond}
+        solver = RK45(lambda _, y: np.array(given.field(y.tolist())), 0.0, given.start, **control)
         nodes, states = [(0.0, given.start)], []
         while solver.status == "running":
             solver.step()
@@ -244,11 +244,19 @@ def cubic(field, t0, y0, t1, y1, at):
 
 
 @pytest.mark.parametrize(
-    ("between", "order", "verdict"),
-    [(linear, 5, "violated"), (linear, 2, "note"), (cubic, 5, "note"), (linear, 0, "note")],
+    ("between", "order", "beyond", "verdict"),
+    [
+        (linear, 5, 0, "violated"),
+        (linear, 2, 0, "note"),
+        (cubic, 5, 0, "note"),
+        (linear, 0, 0, "note"),
+        (linear, 5, 0.01, "violated"),  # its steps end nowhere at a time
+        (cubic, 5, 0.01, "kept"),
+        (linear, 2, 0.01, "kept"),
+    ],
 )
-def test_what_lies_between_steps_is_tried_beside_the_order(between, order, verdict) -> None:
-    peer = double_peer("dense", order, dopri(between))
+def test_what_lies_between_steps_is_tried_beside_the_order(between, order, beyond, verdict) -> None:
+    peer = double_peer("dense", order, dopri(between, beyond))
     found = judged(of_callable(peer), "between steps")
     assert (found.verdict, "between steps" in found.text) == (verdict, True)
 

@@ -119,15 +119,22 @@ def test_laws_that_do_not_fit_a_column_are_counted() -> None:
 
 
 @pytest.mark.parametrize(
-    ("order", "words"),
+    ("orders", "words"),
     [
         ("4", "1.9e-11; order 4 confirmed in single steps."),
         ("0", "1.9e-11; order 0 in single steps."),
         ("", "1.9e-11."),
+        ("4 0", "1.9e-11; order 0 in whole runs, not the declared 4."),  # a fault, and no memory
+        (
+            "3 2",
+            "1.9e-11; order 2 in whole runs, not the declared 4 (3 in single steps: a multistep method should declare "
+            "one_step = false).",
+        ),
     ],
 )
-def test_a_step_of_an_integrator_of_others_is_said_with_its_order(order: str, words: str) -> None:
-    metrics = {"local_error_ulp_max": error("85947")} | ({"observed_order": error(order)} if order else {})
+def test_a_step_of_an_integrator_of_others_is_said_with_its_order(orders: str, words: str) -> None:
+    names = zip(("observed_order", "observed_order_runs"), orders.split(), strict=False)
+    metrics = {"local_error_ulp_max": error("85947")} | {name: error(order) for name, order in names}
     theirs = row(measure="local_error", integrator="mine:rk4", metrics=metrics, order=4)
     sentence = " ".join(line.strip() for line in said(row(measure="local_error", metrics=metrics), theirs)[1:])
     assert sentence == f"euler mine:rk4 in double: one step errs by at most {words}"

@@ -105,7 +105,7 @@ def answer(fault, given):
     numbers = {name: list(map(float, words)) for name, words in given.items() if name in ("inertia", "moment", "state")}
     p = Parameters(numbers["inertia"], numbers["moment"], 0.0)
     y, t, steps = numbers["state"], 0.0, 0
-    h = float(given["setting"][0]) if "setting" in given else 0.01
+    h = float(given["setting"][0]) if "setting" in given and fault != "ignores its step" else 0.01
     times = given["times"][1:]
     if fault == "wrong order":
         times = times[::-1]

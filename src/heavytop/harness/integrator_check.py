@@ -70,11 +70,15 @@ _HUGE_REQUEST = "At |Ω| = 1e150, t = 1"
 _MANY = [Fraction(i, 500) for i in range(1, 1001)]
 _BETWEEN = [Fraction(2 * i, 41) for i in range(1, 42)]
 """Times at which no step is likely to end."""
-_CONTROLS = {"tolerance": (Fraction(1, 10**6), Fraction(1, 10**9)), "step": (Fraction(1, 10), Fraction(1, 20))}
+_CONTROLS = {
+    "tolerance": (Fraction(1, 10**6), Fraction(1, 10**9), Fraction(1, 10**12)),
+    "step": (Fraction(1, 10), Fraction(1, 20), Fraction(1, 500)),
+}
+"""Two values of a control, and one for an integrator whose steps have a limit."""
 _DENSE_RATIO = 30
 """Largest ratio of the error between steps to that at the ends of runs."""
-_LEAST_DENSE_ORDER, _ORDER_MARGIN = 2.5, 0.5
-"""Least order of the dense output, and its allowed gap below the method's; linear interpolation has 2."""
+_LINEAR_ORDER, _LEAST_DENSE_ORDER, _ORDER_MARGIN = 1.5, 2.5, 0.5
+"""Least order of linear interpolation, which has 2, and of other dense output; its allowed gap below the method's."""
 NOT_TRIED = (
     "Not tested here: accuracy, order, run time, and states kept from earlier calls. A plan measures these: "
     "heavytop run --plan gate --integrator NAME."
@@ -405,23 +409,30 @@ class _Contract:
         """Compares the errors between steps with those at the ends of runs, and measures their order in the step."""
         if (control := registry.control_name(self.which)) not in _CONTROLS:
             raise _Note("Not tested: it has neither step nor tolerance.")
-        coarse, fine = (self._between(control, value) for value in _CONTROLS[control])
-        if coarse == fine and fine.between:
-            values = " and ".join(f"{float(value):.2g}" for value in _CONTROLS[control])
-            raise _Note(f"The errors with a {control} of {values} are equal: perhaps the {control} is ignored.")
-        if fine.between <= max(_DENSE_RATIO * fine.ends, _RESTART_EPS * self.precision.eps):
-            return "Samples between steps are as accurate as the ends of runs."
+        *values, finest = _CONTROLS[control]
+        coarse, fine = (self._between(control, value) for value in values)
+        if coarse == fine and fine.between and self._between(control, finest) == fine:
+            text = f"The errors with a {control} of {float(values[0]):.2g} and {float(finest):.2g} are equal: "
+            if self.program:
+                raise _Violated(f'{text}the {control} is ignored. Use it, or declare setting = "none"')
+            raise _Note(f"{text}perhaps the {control} is ignored.")
+        as_at_ends = fine.between <= _DENSE_RATIO * fine.ends
+        kept = "Samples between steps are as accurate as the ends of runs."
+        if fine.between <= _RESTART_EPS * self.precision.eps:
+            return kept
         errors = (
-            f"At a {control} of {float(_CONTROLS[control][1]):.2g} the error is {float(fine.between):.2g} between "
-            f"steps, and {float(fine.ends):.2g} at the ends of runs"
+            f"At a {control} of {float(values[1]):.2g} the error is {float(fine.between):.2g} between steps, and "
+            f"{float(fine.ends):.2g} at the ends of runs"
         )
-        if fine.steps <= coarse.steps or coarse.between <= fine.between:
-            raise _Note(f"{errors}.")
-        power = log(float(coarse.between / fine.between)) / log(fine.steps / coarse.steps)
+        falls = fine.steps > coarse.steps and coarse.between > fine.between
+        power = log(float(coarse.between / fine.between)) / log(fine.steps / coarse.steps) if falls else inf
         text = f"{errors}: between steps it falls like the power {power:.1f} of the step size"
-        if power < min(_LEAST_DENSE_ORDER, fine.order - _ORDER_MARGIN):
+        low = power < min(_LEAST_DENSE_ORDER, fine.order - _ORDER_MARGIN)
+        if low and (power > _LINEAR_ORDER or not as_at_ends):
             raise _Violated(f"{text}, as for linear interpolation, and the order is {fine.order}.")
-        raise _Note(f"{text}.")
+        if as_at_ends:
+            return kept
+        raise _Note(f"{text if falls else errors}.")
 
     def _between(self, control: str, value: Fraction) -> _Between:
         propagate_at, sign = registry.ready(self.which, (control, value)), -1 if self.backward_only else 1

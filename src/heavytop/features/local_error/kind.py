@@ -204,4 +204,4 @@ def _order(row: Row) -> str:
     elif row.order and known:
         text += f", {'not' if int(order) < row.order else 'more than'} the declared {row.order}"
     hint = f" ({single} in single steps: a multistep method should declare one_step = false)"
-    return text + (hint if runs and single not in ("", runs) else "")
+    return text + (hint if runs not in ("", "0") and single not in ("", "0", runs) else "")

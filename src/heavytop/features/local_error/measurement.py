@@ -116,7 +116,7 @@ class LocalError:
         with working_precision(self.bits):
             metrics = self.running.metrics(LOCAL_ERROR)
             if self.orders:
-                metrics[OBSERVED_ORDER] = metric(arb(round(median(self.orders))), "value")
+                metrics[OBSERVED_ORDER] = metric(arb(max(round(median(self.orders)), 0)), "value")
             elif not self.running.count:
                 metrics[OBSERVED_ORDER] = Metric("missing", None, "value")
         metrics.pop(LOCAL_ERROR.over("final"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
@@ -23,6 +23,7 @@ from heavytop.integrate.peers.contract import (
     of_quaternion,
     quaternion,
     require_control,
+    said,
     with_tolerance,
 )
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
@@ -154,9 +155,10 @@ def double_peer(
         raise refusal("control", '"tolerance" or "step"', quoted(control), "Give one of these.")
     if as_integer(order, "order") < 0:
         raise refusal("order", "0 or more", order, "Give 0 where there is none to declare.")
-    text(name, "name")
-    for option, value in (("one_step", one_step), ("fixed_grid", fixed_grid)):
-        flag(value, option)
+    name, control = str(text(name, "name")), str(control)
+    if not name or said(name) != name:
+        raise refusal("name", "1 to 200 printable characters", quoted(name), "Give such a name.")
+    one_step, fixed_grid = bool(flag(one_step, "one_step")), bool(flag(fixed_grid, "fixed_grid"))
     singular = tuple(vectors.vector(point, "singular_at") for point in singular_at)
     if attitude not in (False, True, "quaternion"):
         raise refusal("attitude", 'True, False or "quaternion"', quoted(attitude), "Give one of these.")
@@ -221,9 +223,12 @@ def fixed_steps(
 
 
 def _declared(names: Sequence[str] | None) -> tuple[str, ...] | None:
-    if names is not None and (isinstance(names, str) or not all(isinstance(name, str) for name in names)):
+    if names is None:
+        return None
+    members = tuple(names) if isinstance(names, Iterable) and not isinstance(names, str) else (None,)
+    if not all(isinstance(name, str) for name in members):
         raise refusal("Declared capabilities", "lists of names", quoted(names), 'Give, for example, ["heavy_top"].')
-    return None if names is None else tuple(names)
+    return tuple(map(str, members))
 
 
 def _request(name: str, control: str, problem: Problem, times: Sequence[Fraction], value: Fraction) -> Request:
