@@ -4,7 +4,7 @@ import pytest
 
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
-from heavytop.records import Against, Explained, Law, Row, Subject
+from heavytop.records import Against, Explained, Law, Metric, Row, Subject
 from heavytop.report.compare.findings import MOST
 from heavytop.report.compare.noise import Policy, Rule, Timings
 from heavytop.report.compare.verdicts import Verdict
@@ -109,6 +109,8 @@ def test_a_row_that_no_sentence_names_is_no_other_row() -> None:
     assert found([old], [new]) == ["1 row changed."]
     lost = "Drift of M·γ 1e-9 → - on euler up to T = 100 (mine:rk5, double), the metric is missing."
     assert found([new], [old]) == [lost, "No other row changed."]
+    old, new = (replace(old, metrics={"drift_spin3_max": metric}) for metric in (Metric("0", None), error("1e-9")))
+    assert found([old], [new])[0] == "Drift of Ω3 0 → 1e-9 on euler up to T = 100 (mine:rk5, double)."
 
 
 def test_rows_of_two_versions_are_one_row_and_both_versions_are_said() -> None:
@@ -161,7 +163,7 @@ def test_a_last_state_that_is_as_it_was_points_to_the_dense_output(last: str, dr
     names = (DIGITS, "solution_error_omega_final", "drift_energy_max")
     old = rk5(metrics={name: error("1e-12") for name in names})
     new = replace(old, metrics=dict(zip(names, map(error, ("1e-6", last, drift)), strict=True)))
-    assert ("errors are between steps" in found([old], [new])[0]) is between
+    assert ("as where dense output is wrong" in found([old], [new])[0]) is between
     given = [
         replace(each, key=replace(each.key, subject=replace(each.key.subject, what="given"))) for each in (old, new)
     ]

@@ -500,7 +500,7 @@ def _digits_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Se
         others = len(changes) - 1
         more = f", {'fewer' if sign > 0 else 'more'} on {plural(others, 'other row')} too" if others else ""
         if worst.lost > _ENDS_AS_BEFORE and sign > 0 and all(_ends_as_before(change) for change in changes):
-            more += "; the last state is unchanged: the errors are between steps, in the dense output"
+            more += "; the error of the last state is as before, as where dense output is wrong"
         yield Sentence(
             f"Digits right {old} → {new} on {_where(worst.identity)}{more}.", frozenset(c.identity for c in changes)
         )
@@ -557,9 +557,9 @@ def _quantity(quantity: Quantity | None, name: str) -> str:
     """``error along the flow``, ``drift of the energy``; the key of an unknown quantity."""
     if quantity is None:
         return clip(name, 60)
-    what = _WORDS.get(quantity.name, quantity.name.replace("_", " "))
-    component = quantity.component
-    return f"{what} {_COMPONENTS.get(component, integral_text(component))}".strip()
+    what, component = _WORDS.get(quantity.name, quantity.name.replace("_", " ")), integral_text(quantity.component)
+    component = f"of {component}" if quantity.name == DRIFT else component
+    return f"{what} {_COMPONENTS.get(quantity.component, component)}".strip()
 
 
 def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:
@@ -578,7 +578,7 @@ def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdic
         values = f" {short(finding.baseline or '-')} → {short(finding.candidate or '-')}"
         if finding.of == "series":
             values = " at its samples"
-        unchanged = abs(change.decades(finding.metric) or 0.0) < _LEAST_LOSS
+        unchanged = abs(change.decades(finding.metric) or 0.0) < _LEAST_LOSS and finding.baseline != "0"
         reason = f", {finding.reason}" if finding.reason and unchanged else ""
         named = frozenset(c.identity for _, c, _ in cases)
         also = f"; also on {plural(len(named) - 1, 'other row')}" if len(named) > 1 else ""
