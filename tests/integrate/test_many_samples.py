@@ -146,12 +146,25 @@ def test_an_equilibrium_and_units_of_any_size(name: str) -> None:
         assert_as_one_by_one(name, late, case=replace(CASE, top=top, start=start))
 
 
-@pytest.mark.parametrize("last", [50, -10_000])
-def test_many_samples_are_one_call_of_the_same_bits(last: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    times = regular(300, last)
-    assert_as_one_by_one("heyoka", times)
+@pytest.mark.parametrize(
+    ("last", "case", "precision", "short", "close"),
+    [
+        (50, "kovalevskaya", DOUBLE, 0.97, 200),
+        (-10_000, "kovalevskaya", DOUBLE, 0.97, 200),
+        (20_000, "kovalevskaya", DOUBLE, 0.97, 200),
+        (-20_000, "kovalevskaya", DOUBLE, 5, 200),  # strides end beyond a sample and are taken back
+        (24_000, "kovalevskaya-asymptotic", DOUBLE, 0.97, 200),
+        (1_000, "generic", EXTENDED, 0.97, 10),
+    ],
+    ids=str,
+)
+def test_many_samples_are_one_call_of_the_same_bits(last, case, precision, short, close, monkeypatch) -> None:
+    times, top = regular(300, last), CASES[case]
+    monkeypatch.setattr(motions, "_SHORT", short)
+    monkeypatch.setattr(motions, "_CLOSE", close)
+    assert_as_one_by_one("heyoka", times, precision, top)
     monkeypatch.setattr(motions.Stepper, "sample", lambda *_: pytest.fail("a sample of its own"))
-    assert len(run_of("heyoka", times).states) == 301
+    assert len(run_of("heyoka", times, precision, top).states) == 301
 
 
 @pytest.mark.parametrize(("name", "most"), [("heyoka", 5), ("multiword", 8)])

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache
+from operator import ge, le
 from time import perf_counter
 from typing import Any
 
@@ -36,10 +37,12 @@ from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
 
 
 CHUNK_SECONDS = 0.25
-_MANY, _CLOSE = 256, 400
-"""States at so many times, with at most so many steps between two of them, are computed in one call of heyoka."""
-_ON_A_GRID = {"double": 500_000, "extended": 100_000, "quad": 10_000}
-"""The most steps of such a call, which cannot be interrupted: about a second."""
+_MANY, _CLOSE = 256, 200
+"""States at so many times, with at most so many steps between two of them, are computed on a grid by heyoka."""
+_AT_ONCE = {"double": 500_000, "extended": 100_000, "quad": 10_000}
+"""The most steps of a run that cannot be interrupted: about a second."""
+_SHORT = 0.97
+"""The part of the way to a sample that is taken in steps of the mean length."""
 _GROWTH = 16
 """At most so many times the steps so far are taken at once: few steps say little about the longest."""
 _SLOWEST, _FASTEST, _SLOW, _FAST = Fraction(1, 2**48), Fraction(2) ** 55, 2.0**-46, 2.0**52
@@ -348,29 +351,58 @@ def states_at(
 def _at_once(
     engine: Any, begin: Callable[[], None], targets: Sequence[Any], step_limit: int | None, precision: Precision
 ) -> tuple[int, Any] | None:
-    """Steps and states at many targets, with the bits of :class:`Stepper`, in one call of heyoka.
+    """Steps and states at many targets, with the bits of :class:`Stepper`, without interruption.
 
     begin: sets the engine to the beginning; called first to measure the first step, and again for the run.
-    heyoka cuts the last step alone, whose polynomial does not depend on its length.  None for few targets, in
-    arbitrary precision, for long runs, and where the call does not reach the last target; the state of the engine is
-    then undefined.
+    On a grid heyoka cuts the last step alone, whose polynomial does not depend on its length.  None for few targets, in
+    arbitrary precision, for long runs, and where the last target is not reached; the state of the engine is then
+    undefined.
     """
-    most = _ON_A_GRID.get(precision.family, 0)
+    most = _AT_ONCE.get(precision.family, 0)
     if len(targets) < _MANY or not most:
         return None
     begin()
     end = far(bool(targets[-1] >= 0), precision)
     engine.propagate_until(end, max_steps=1)
-    shortest = abs(float(targets[-1])) / min(_CLOSE * len(targets), most)
-    if engine.time == end or abs(float(engine.time)) < shortest:  # at rest, or a long run
+    if engine.time == end:  # at rest
+        return None
+    expected = abs(float(targets[-1])) / abs(float(engine.time))
+    if expected > most:
         return None
     begin()
+    most = min(step_limit or most, most)
+    if expected > _CLOSE * len(targets):
+        return _in_strides(engine, targets, most, end)
     start = [] if targets[0] == 0 else [engine.time]
     grid = numpy.concatenate([numpy.array([*start, targets[0]]), numpy.array(targets[1:])])
-    _, _, _, steps, _, states = engine.propagate_grid(grid, max_steps=min(step_limit or most, most))
+    _, _, _, steps, _, states = engine.propagate_grid(grid, max_steps=most)
     if len(states) != len(grid) or not numpy.isfinite(states[-1]).all():
         return None
     return steps, states[len(start) :]
+
+
+def _in_strides(engine: Any, targets: Sequence[Any], most: int, end: Any) -> tuple[int, Any] | None:
+    """As :func:`_at_once`, with polynomials of the last steps before each target; heyoka's grid has those of all."""
+    states, steps, longest, even, failed = [], 0, 0.0, True, not_finite()
+    step, reached = (engine.step, ge) if end > 0 else (engine.step_backward, le)
+    for target in targets:
+        goal = target, 0.0
+        while not reached(now := engine.dtime, goal):
+            left, state = abs(float(target - now[0])), engine.state.copy()
+            shortest = min(longest, abs(float(now[0])) / (_SHORT * steps)) if even and steps else longest
+            count = int(left / shortest) - 1 if steps else 1
+            if count < 2:
+                (outcome, length), done = step(True), 1  # write_tc
+            else:
+                outcome, _, length, done, *_ = engine.propagate_until(end, max_steps=count)
+                if reached(engine.dtime, goal):
+                    engine.state[:], engine.dtime, longest, even = state, now, 1.5 * longest, False
+                    continue
+            steps, longest = steps + done, max(longest, abs(float(length)))
+            if steps > most or outcome == failed:
+                return None
+        states.append(engine.update_d_output(target).copy() if steps else engine.state.copy())
+    return steps, states
 
 
 def _trajectory(tool: Compiled, problem: Problem, run: Stepper, *ended: *Ended) -> Trajectory:
