@@ -180,8 +180,11 @@ def test_a_last_value_below_its_own_root_mean_square_is_luck() -> None:
 
     assert verdicts(ends("1e-15"), ends("2e-12"))["drift_energy_final"] == "same"
     assert verdicts(ends("1e-15"), ends("5e-12"))["drift_energy_final"] == "worse"
-    smaller = verdicts(ends("2e-12"), ends("1e-12", "9e-12"))
-    assert (smaller["drift_energy_rms"], smaller["drift_energy_final"]) == ("worse", "same")
+    for pair, verdict in (
+        ((ends("2e-12"), ends("1e-12", "9e-12")), "worse"),
+        ((ends("1e-12", "9e-12"), ends("2e-12")), "better"),
+    ):
+        assert verdicts(*pair) == {"drift_energy_rms": verdict, "drift_energy_final": "same"}
 
 
 LAWS = ["bounded", "t^0.5", "t", "t^1.5", "t^2", "exponential"]

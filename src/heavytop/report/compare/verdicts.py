@@ -117,7 +117,9 @@ def _errors(
             return Verdict.INCOMPARABLE, f"unresolved below {new.bound}"
         far = moved > allowed + _UNRESOLVED
         return (Verdict.INCOMPARABLE, f"unresolved below {new.bound}, {moved:.1f} decades away") if far else SAME
-    if a == b or (old.value == UNRESOLVED and b <= a) or (a < b and size(new) <= size(old)):  # a floor alone rose
+    if a == b or (old.value == UNRESOLVED and b <= a):
+        return SAME
+    if size(old) == size(new) or (a < b) != (size(old) < size(new)):  # a floor alone moved
         return SAME
     if math.isinf(a) or math.isinf(b):
         return (Verdict.WORSE, "no longer exactly 0") if b > a else (Verdict.BETTER, "now exactly 0")
