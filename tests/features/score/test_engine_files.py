@@ -86,6 +86,8 @@ IN_FILE = [
     ("", FINE, Log(), {}),
     ("start", FINE, Log(VECTORS, keys={"omega": "0.701,-0.4,3"}), {"Ω1": "0.7"}),
     ("start", FINE, Log(QUATERNION, keys={"start_quaternion": START}), {}),
+    ("start", FINE, Log(("omega",), keys={"omega": "0.71,-0.4,3"}), {"angle": "0"}),  # about the vertical: any fits
+    ("", replace(COARSE, step=2e-4, every=2), Log(("position",)), {}),
     ("column_constant", FINE, column(1, lambda value: 0.25), {"column": "Ω2", "value": "0.25"}),
     ("column_scaled", FINE, column(1, lambda value: 1.02 * value), {"column": "Ω2", "factor": "1.02"}),
     ("axes_permuted", FINE, of_columns(lambda w: w[[1, 0, 2]], "omega"), {"of": "omega"}),

@@ -13,6 +13,7 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import combinations, permutations, product
+from math import floor, log10
 from typing import Any
 
 import numpy
@@ -58,10 +59,12 @@ _CONTRADICTS = 0.1
 _REFINED = 8
 _FEWEST = 4
 """Fewest samples to which the six numbers of a start, or one of the body, are fitted."""
+_TURNED = 0.5
+"""Radians within which the six numbers of a start fit the errors of a method."""
 _SLIGHT = 1e-6
 """Step of a difference quotient, relative to the number."""
 _ROUND = 3
-"""Digits of a factor that is round: no error of a method has one by accident."""
+"""Most digits of a factor that is round."""
 _START_DROP = 1e5
 """Factor by which the error must fall for another start: its six numbers may also absorb the errors of first steps."""
 Row = tuple[str, dict[str, str], dict[str, Any]]
@@ -112,17 +115,23 @@ class ConventionSearch(Search):
             yield from map(self._tried, _pairs(self.samples))
 
     def counted(self, error: float, looked: int) -> float:
-        """Of the first positions, where nothing else is given, as far as they move: many readings explain the first."""
+        """Of the first positions, where nothing else is given, as far as they move, and of two nothing.
+
+        Many readings explain where positions begin.
+        """
         most = super().counted(error, looked)
         if looked == len(self.file_errors) or self.samples.columns.keys() != {"position"}:
             return most
+        if looked <= len(self.early.times):
+            return 0.0
         moved = numpy.ptp(self.samples.columns["position"][:looked], axis=0).max()
         return min(most, float(moved / (numpy.linalg.norm(self.samples.point) or 1.0)))
 
     def of_start(self) -> Diagnosis | None:
-        """Another start, tried last: its six numbers also fit a motion that is only early or late."""
+        """Another start, tried last: its six numbers also fit a motion that is early or late, or turns by little."""
         error = float(self.file_errors.max())
-        if not self.reaches or not WORTH_ASKING < error < numpy.inf or len(self.file_errors) < _FEWEST:
+        angle = turning(self.samples.body, self.start) * abs(float(self.times[-1]))
+        if not self.reaches or not WORTH_ASKING < error < numpy.inf or angle < _TURNED or len(self.times) < _FEWEST:
             return None
         return self.best([*map(self._tried, _start(self))], error)
 
@@ -300,13 +309,19 @@ def _data(search: ConventionSearch) -> Iterator[Row]:
             return {"body": replace(samples.body, **scaled)}
 
         x, left = _refined(search, body_of, 1, DROP)
-        factor = plain_number(1.0 + float(x[0]), max(AS_LIKELY * left, _SAME)) if abs(x[0]) < numpy.inf else Fraction(1)
+        near = max(AS_LIKELY * left, _SAME)
+        factor = plain_number(1.0 + float(x[0]), near) if abs(x[0]) < numpy.inf else Fraction(1)
         if notable(factor, Fraction(1)):
-            is_round = Fraction(decimal_text(factor, _ROUND)) == factor and factor != 1
-            numbers = {**numbers, "factor": decimal_text(factor, 8)}
+            is_round, numbers = _is_round(factor, near), {**numbers, "factor": decimal_text(factor, 8)}
             if key == "rotor" and factor == -1:
                 kind, numbers = "rotor_sign", {}
             yield kind, numbers, {**body_of(numpy.array([float(factor) - 1])), **_FITTED, "is_round": is_round}
+
+
+def _is_round(factor: Fraction, near: float) -> bool:
+    """Whether a factor has few digits, as one that is known within ``near`` has by accident in one case of ten."""
+    digits = next((n for n in range(1, _ROUND + 1) if Fraction(decimal_text(factor, n)) == factor), 0)
+    return factor not in (0, 1) and digits > 0 and 20 * near <= 10.0 ** (floor(log10(abs(factor))) - digits + 1)
 
 
 def _start(search: ConventionSearch) -> Iterator[Row]:

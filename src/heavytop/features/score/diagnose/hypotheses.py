@@ -563,6 +563,8 @@ _WITHIN = 0.3
 """A time of the grid is tried if the first state is so near to the motion there, relative to its size."""
 _TRIED = 12
 _REFINED = 6
+_NOISE = 1e-6
+"""Relative size of singular values that are rounding of difference quotients."""
 _FALLS = 1.5
 """Factor by which the sum of squares falls while a number is refined."""
 _SPAN = Fraction(1, 10)
@@ -708,7 +710,7 @@ def gauss_newton(off: Callable[[Array], Array], x: Array, slight: float, most: i
         slopes = [(off(x + slight * unit) - here) / slight for unit in numpy.eye(len(x))]
         if not all(numpy.isfinite(part).all() for part in (here, *slopes)):
             break
-        after = x - numpy.linalg.lstsq(numpy.stack(slopes, axis=1), here, rcond=None)[0]
+        after = x - numpy.linalg.lstsq(numpy.stack(slopes, axis=1), here, rcond=_NOISE)[0]
         there = off(after)
         if not float(there @ there) < float(here @ here):
             break
