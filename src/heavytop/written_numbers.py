@@ -29,6 +29,8 @@ def number(value: Any, what: str) -> Fraction | None:
     if not isinstance(value, str):
         raise InputError(f"{what} must be a number; got a {type(value).__name__}.", _REMEDY)
     text = value.strip()
+    if not text:
+        raise InputError(f"{what} is empty.", "Give every row all columns, and nan for a missing number.")
     if _PLAIN.fullmatch(text):
         return exact(text)
     if _NOT_FINITE.fullmatch(text):

@@ -71,6 +71,11 @@ class Convention:
     point: Vector | None = None
 
     def __post_init__(self) -> None:
+        if (capitals := self.sequence.upper()) != self.sequence and capitals in SEQUENCES:
+            raise InputError(
+                f"sequence = {self.sequence} is ambiguous: in SciPy, small letters are extrinsic angles.",
+                f"Write {capitals} if yours are intrinsic; extrinsic a, b, c are c, b, a of {capitals[::-1]}.",
+            )
         known = {
             "quaternion_order": ORDERS,
             "quaternion": DIRECTIONS,

@@ -533,8 +533,10 @@ def _mjcf(path: Path, root: Element) -> Iterator[Link]:
     """Bodies with an inertial element, read exactly; those that MuJoCo computes or includes, read by MuJoCo."""
     settings = {key: value for compiler in root.iter("compiler") for key, value in compiler.attrib.items()}
     for key, value in [*settings.items(), *(pair for flag in root.iter("flag") for pair in flag.items())]:
-        if not re.fullmatch(words := _WORDS.get(key, ".*"), value):
-            raise refusal(key, words.replace("|", " or "), quoted(value), "Correct the file.")
+        if value not in (words := _WORDS.get(key, (value,))):
+            raise refusal(key, " or ".join(words), quoted(value), "Correct the file.")
+    if not re.fullmatch("[xyzXYZ]{3}", sequence := settings.get("eulerseq", "xyz")):
+        raise refusal("eulerseq", "three of the letters x y z X Y Z", quoted(sequence), "Correct the file.")
     if settings.get("coordinate", "local") != "local":
         raise InputError(f"{path} uses global coordinates.", "Load and save it in MuJoCo 2.3.3: they become local.")
     fused = any(settings.get(key, "auto") not in ("auto", "false") for key in ("inertiafromgeom", "fusestatic"))
@@ -554,12 +556,11 @@ def _mjcf(path: Path, root: Element) -> Iterator[Link]:
 
 
 _WORDS = {
-    "angle": "degree|radian",
-    "eulerseq": "[xyzXYZ]{3}",
-    "balanceinertia": "true|false",
-    "gravity": "enable|disable",
+    "angle": ("degree", "radian"),
+    "balanceinertia": ("true", "false"),
+    "gravity": ("enable", "disable"),
 }
-"""Values of settings and flags that are read, as patterns."""
+"""Values of settings and flags that are read."""
 
 
 def _gravity(root: Element) -> Vector:

@@ -555,6 +555,7 @@ REFUSED = {
     ),
     "gravty": (in_mjcf(BALL, '<option gravty="0 0 -1.62"/>'), "<option>: unknown gravty.\n  Did you mean gravity?"),
     "Disable": (in_mjcf(BALL, '<option><flag gravity="Disable"/></option>'), "enable or disable; got 'Disable'"),
+    "xyzz": (of_class("xyzz"), "three of the letters x y z X Y Z; got 'xyzz'"),
     "radians": (in_mjcf(BALL, '<compiler angle="radians"/>'), "degree or radian; got 'radians'"),
     "settotalmas": (in_mjcf(BALL, '<compiler settotalmas="5"/>'), "Did you mean settotalmass?"),
     "armature": (in_mjcf(f'<joint type="ball" armature="1"/>{BALL}'), "armature of its ball joint"),

@@ -148,7 +148,7 @@ def test_a_number_in_degrees_is_converted_to_the_last_digit(tmp_path: Path) -> N
         ("q[0] q[1] q[2] q[3]", {"quaternion": "0 1 2 3"}),
         ("q(w) quat(x)", {"quaternion": "w x"}),
         ("p[rad/s] q[1/s] r", {"omega": "1 2 3"}),  # no index, nor in the next
-        ("phi[1] theta[rad] psi[rad]", {"euler": "1 2 3"}),
+        ("phi[1] theta[rad] psi[rad]", {"euler": "φ θ ψ"}),
         ("x[1] y[m] z", {"position": "x y z"}),
         # w, x, y, z beside each other are a quaternion
         ("t w x y z", {"quaternion": "w x y z"}),

@@ -244,7 +244,7 @@ def score(
     names = arguments.text(name, "name"), arguments.text(integrator, "integrator")
     words = {"quaternion_order": quaternion_order, "quaternion": quaternion, "matrix": matrix, "angles": angles}
     words |= {"sequence": sequence, "up": up}
-    words = {word: arguments.text(value, word) for word, value in words.items()} | {"sequence": sequence.upper()}
+    words = {word: arguments.text(value, word) for word, value in words.items()}
     given = None if states is None else _rows(states, "states")  # read once: it may be an iterator
     flag = bool(arguments.flag(normalize, "normalize"))
     arrays = columns(

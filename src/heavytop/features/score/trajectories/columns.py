@@ -52,9 +52,12 @@ _NAMES = {
         ("omega", "1", "p"),
         ("omega", "2", "q"),
         ("omega", "3", "r"),
-        ("euler", "1", "euler1 angle1 phi φ alpha α"),
-        ("euler", "2", "euler2 angle2 theta θ beta β"),
-        ("euler", "3", "euler3 angle3 psi ψ"),
+        ("euler", "1", "euler1 angle1 alpha α"),
+        ("euler", "2", "euler2 angle2 beta β"),
+        ("euler", "3", "euler3 angle3"),
+        ("euler", "φ", "phi φ"),
+        ("euler", "θ", "theta θ"),
+        ("euler", "ψ", "psi ψ"),
         ("euler", "X", "roll"),
         ("euler", "Y", "pitch"),
         ("euler", "Z", "yaw heading"),
@@ -63,6 +66,7 @@ _NAMES = {
 }
 """Names of single components, before :data:`_PATTERNS`."""
 _AXES = {"x": "1", "y": "2", "z": "3"}
+_GREEK = ("φ", "θ", "ψ")
 _CLASSIC = ("p", "q", "r")
 _TIME = ("t", "time", "timestamp", "stamp")
 _TOGETHER = (tuple("wxyz"), tuple("xyzw"), ("e0", "e1", "e2", "e3"))
@@ -157,7 +161,8 @@ def header(names: Sequence[str], joint: str = "") -> Header:
             units["t"] = {_unit("t", name)}
             continue
         meaning = _meaning(plain)
-        if meaning is None or (meaning[0] == "position" and _UNIT.search(name.strip())):  # rx [deg] is an angle
+        is_angle = _UNIT.search(name.strip()) or (plain.startswith("r") and "px" in plainly)  # rx [deg]; rx beside tx
+        if meaning is None or (meaning[0] == "position" and is_angle):
             others.append(name)
             continue
         quantity, component = meaning
@@ -264,7 +269,7 @@ def _with_index(name: str) -> str:
 def _plain(name: str) -> str:
     text = unicodedata.normalize("NFKC", re.sub(r"\s*[\[(/].*$", "", name)).lower()
     text = re.sub(r"_(deg(rees)?|rad(ians)?)$", "", text.strip())
-    return re.sub(r"[\s_{}\\.^-]", "", text)
+    return re.sub(r"[\s_{}\\.:^-]", "", text)
 
 
 def _meaning(plain: str) -> tuple[str, str] | None:
@@ -289,7 +294,7 @@ def ordered_places(
     quantity: str, components: Mapping[str, int], scalar_last: bool, sequence: str
 ) -> list[tuple[str, int]]:
     """Name and index of each component in the order of the quantity; raises InputError for a missing one."""
-    names = _components(quantity, set(components), scalar_last, sequence)
+    names = _components(quantity, [*components], scalar_last, sequence)
     missing = [name for name in names if name not in components]
     extra = [name for name in components if name not in names]
     if missing or extra:
@@ -299,7 +304,8 @@ def ordered_places(
     return [(name, components[name]) for name in names]
 
 
-def _components(quantity: str, there: set[str], scalar_last: bool, sequence: str) -> list[str]:
+def _components(quantity: str, names: Sequence[str], scalar_last: bool, sequence: str) -> list[str]:
+    there = set(names)
     if quantity == "quaternion":
         if there & set("wxyz"):
             return list("xyzw" if scalar_last else "wxyz")
@@ -314,6 +320,14 @@ def _components(quantity: str, there: set[str], scalar_last: bool, sequence: str
                 'Give sequence, such as "ZYX", or call the columns euler1, euler2, euler3.',
             )
         return list(sequence)
+    if there & {*_GREEK}:
+        of_axes = len({*sequence}) == 3 and sequence != "XYZ"
+        if there == {*_GREEK} and (of_axes or [*names] != [*_GREEK]):
+            raise InputError(
+                f"The columns {', '.join(names)} do not say which angle of {sequence or 'a sequence'} is the first.",
+                "Call them euler1, euler2, euler3 in the order of the sequence, or roll, pitch, yaw about X, Y, Z.",
+            )
+        return list(_GREEK)
     if there & set("xyz"):
         return list("xyz")
     return list("012" if "0" in there else "123")
@@ -327,13 +341,6 @@ def _words(quantity: str) -> str:
         "rodrigues": "modified Rodrigues parameters",
         "rotation_vector": "rotation vector",
     }.get(quantity, quantity)
-
-
-def cell(text: str, where: str) -> Fraction | None:
-    """An exact number; None for NaN and infinities; InputError that names the place for everything else."""
-    if not text.strip():
-        raise InputError(f"{where} is empty.", "Give every row all columns, and nan for a missing number.")
-    return written_numbers.number(text, where)
 
 
 # Quantities of files with attitudes, positions or Ω in any axes, or with the data of a body.
@@ -389,7 +396,7 @@ def convention(document: Mapping[str, Any], header: Header | None = None) -> Con
             stated[key] = document[key].strip()
     for key in ("sequence", "angles", "up"):
         if (word := _word(document, key)) is not None:
-            stated[key] = word.upper() if key == "sequence" else word.lower().lstrip("+")
+            stated[key] = word if key == "sequence" else word.lower().lstrip("+")
     if header is not None and header.angles and stated.setdefault("angles", header.angles) != header.angles:
         raise InputError(f"The header declares {header.angles}, but angles = {stated['angles']}.", "Give it once.")
     for key in ("pivot", "point"):
@@ -498,7 +505,8 @@ def _of_table(document: Mapping[str, Any], convention: Convention) -> ColumnTabl
     named = {name: [(f"{prefixes.get(name, name)}{part}", place) for part, place in places[name]] for name in values}
     for number, row in zip(lines, cells, strict=True):
         for name in values:
-            values[name].append(_complete(cell(row[p], f"Line {number}, column {n}") for n, p in named[name]))
+            cells_of = ((row[place], f"Line {number}, column {part}") for part, place in named[name])
+            values[name].append(_complete(written_numbers.number(*text) for text in cells_of))
     texts = [row[distance] for row in cells for name in values for _, distance in places[name]]
     for name, unit in units.items():
         values[name] = _times(unit.factor(max(map(len, texts), default=0)), values[name])
@@ -568,8 +576,10 @@ def _of_lists(document: Mapping[str, Any], convention: Convention) -> ColumnTabl
     for name in WIDTHS:
         if name in columns:
             key, rows = columns[name]
-            named = ((f"{key}[{i}]", row) for i, row in enumerate(rows))
-            values[name] = [_complete(written_numbers.number(v, where) for v in row) for where, row in named]
+            values[name] = [
+                _complete(written_numbers.number(value, f"{key}[{i}][{j}]") for j, value in enumerate(row))
+                for i, row in enumerate(rows)
+            ]
     texts = [str(value) for _, rows in columns.values() for row in rows for value in row]
     return ColumnTable(values, texts, [f"row {i + 1}" for i in range(max(counts.values(), default=0))])
 

@@ -107,7 +107,7 @@ def read_table(text: str, started: bool = False) -> tuple[dict[str, Any], list[s
     if joint == "free" and any(name.strip().startswith("qpos") for name in names):
         keys.setdefault("point", ["0", "0", "0"])
     meaning = observed_columns.header(names, joint)
-    logs.require_understood(names, meaning.others, [*meaning.places])
+    logs.require_understood(names, meaning.others, [*meaning.places], cells)
     cut, times = "", [] if meaning.time is None else [logs.number(row[meaning.time]) for row in cells]
     if times and None not in times:
         kept, noted, cut = logs.without_repeats([time for time in times if time is not None], cells, lines)

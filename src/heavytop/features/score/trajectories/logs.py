@@ -61,11 +61,18 @@ _ALIASES = tuple(
 )
 _JOINTS = {"free": (3, 3), "ball": (0, 0)}
 """Index of the quaternion in qpos of MuJoCo, and of the angular velocity in body axes in qvel."""
-_INDEX = re.compile(r"(qpos|qvel)[\[_(]?(\d+)[\])]?", re.IGNORECASE)
+_INDEX = re.compile(r"(qpos|qvel)[\[_(.]?(\d+)[\])]?", re.IGNORECASE)
 _DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
 _LOOKS = {
-    "an attitude": re.compile(r"quat|orient|attitude|(^|[^a-z])att[^a-z]|[._]q[\[(]\d|rodrigues|euler|dcm", re.I),
-    "an angular velocity": re.compile(r"omega|ang(ular)?[ _.-]?(vel|rate)|gyro|body[ _.-]?rate", re.IGNORECASE),
+    "an attitude": re.compile(
+        r"quat|orient|attitude|(^|[^a-z])att[^a-z]|[._]q[\[(]\d|rodrigues|gibbs|euler|dcm|(rot|angle|theta)_?[xyz]$",
+        re.I,
+    ),
+    "an angular velocity": re.compile(
+        r"omega|ang(ular)?[ _.-]?(vel|rate)|gyro|body[ _.-]?rate|(roll|pitch|yaw)_?(speed|rate)|\b(rot|a|w)_?vel"
+        r"|(^|[._])rates?[._]?[xyz1-3]$|^av[xyz1-3]$|^w_[a-z]{2}_[xyz]$",
+        re.IGNORECASE,
+    ),
 }
 _GIVES = {
     "an attitude": ("quaternion", "matrix", "euler", "rodrigues", "rotation_vector", "gamma"),
@@ -106,10 +113,13 @@ def _alias(text: str, joint: str) -> str:
     return text
 
 
-def require_understood(names: Sequence[str], others: Sequence[str], quantities: Sequence[str]) -> None:
+def require_understood(
+    names: Sequence[str], others: Sequence[str], quantities: Sequence[str], cells: Sequence[Sequence[str]]
+) -> None:
     """Raises InputError for a column that looks like an attitude or Ω and is not read, where no other gives one.
 
-    names: of all columns; others: of those that are not read.
+    names: of all columns; others: of those that are not read.  cells: of each row, in which four or nine neighbours
+    look like a quaternion or a matrix.
     """
     missing = [what for what, given in _GIVES.items() if not set(given) & set(quantities)]
     if "an attitude" in missing and {"rx", "ry", "rz"} <= {re.sub(r"\W.*", "", name.strip().lower()) for name in names}:
@@ -122,15 +132,22 @@ def require_understood(names: Sequence[str], others: Sequence[str], quantities: 
             "The columns gx, gy, gz are ambiguous: Ω of a gyroscope, or γ.",
             "Call them omega1, omega2, omega3, or gamma1, gamma2, gamma3.",
         )
-    for name in others:
-        looks = next((what for what in missing if _LOOKS[what].search(name)), None)
-        if looks and not _OTHER.match(name):
+    unread = [name for name in others if not _OTHER.match(name)]
+    for name in unread:
+        if looks := next((what for what in missing if _LOOKS[what].search(name)), None):
             raise InputError(f"The column {quoted(name)} looks like {looks}, but the name is unknown.", NAMES)
-        if len(missing) == len(_GIVES) and _INDEX.fullmatch(name):
+        index = _INDEX.fullmatch(name)
+        if index and ("an attitude" if index[1].lower() == "qpos" else "an angular velocity") in missing:
             raise InputError(
                 f"The joint of the column {quoted(name)} is not declared.",
                 "Add the line `# joint: free` or `# joint: ball` above the columns.",
             )
+    for width in (4, 9) if "an attitude" in missing else ():
+        for first in range(len(names) - width + 1):
+            part = slice(first, first + width)
+            if {*names[part]} <= {*unread} and _are_attitudes([row[part] for row in cells]):
+                columns = f"{quoted(names[first])} to {quoted(names[part][-1])}"
+                raise InputError(f"The columns {columns} look like an attitude, but the names are unknown.", NAMES)
 
 
 _OF_1970 = 10**9, 4 * 10**9
@@ -221,9 +238,16 @@ def number(text: str) -> Fraction | None:
 
 
 def is_unit(texts: Sequence[str]) -> bool:
-    """Whether four numbers have length 1 to 1 %, as a quaternion."""
+    """Whether numbers have length 1 to 1 %, as those of a quaternion."""
     values = [number(text) for text in texts]
     return None not in values and abs(sum(float(value or 0) ** 2 for value in values) - 1) < 0.02
+
+
+def _are_attitudes(rows: Sequence[Sequence[str]]) -> bool:
+    """Whether four numbers that vary have length 1 in every row, or nine, as a matrix, in its rows and columns."""
+    of_matrix = [part for i in range(3) for part in (slice(3 * i, 3 * i + 3), slice(i, 9, 3))]
+    parts = [slice(4)] if len(rows[0]) == 4 else of_matrix
+    return rows[0] != rows[-1] and all(is_unit(row[part]) for row in rows for part in parts)
 
 
 def without_repeats(
