@@ -782,29 +782,56 @@ def _of_axes(x: Sequence[Fraction], y: Sequence[Fraction]) -> Tensor:
     return _rotation(Attitude.matrix(transposed(columns), normalize=True))
 
 
-_PRIM = re.compile(r'(?:def|over)\s+(?:\w+\s+)?"([^"]*)"')
-_USD_NAMES = ("mass", "centerOfMass", "diagonalInertia", "principalAxes", "disableGravity")
-_STAGE = ("metersPerUnit", "kilogramsPerUnit", "gravityMagnitude")
-_USD = re.compile(rf"(?:physics|physxRigidBody):({'|'.join(_USD_NAMES)})\s*=\s*(\([^)]*\)|[^\s]+)")
+_USD_NAMES = (
+    *("mass", "centerOfMass", "diagonalInertia", "principalAxes", "gravityMagnitude", "gravityDirection"),
+    "disableGravity",
+)
+_STAGE = {"metersPerUnit": "0.01", "kilogramsPerUnit": "1", "upAxis": "Z"}
+_TOKEN = re.compile(
+    r'(?:(def|over|class)\s+(?:\w+\s+)?"([^"]*)")'
+    rf"|(?:physics|physxRigidBody):({'|'.join(_USD_NAMES)})\s*=\s*(\([^)]*\)|[^\s]+)"
+    r'|"[^"\n]*"|([(){}])'
+)
+"""A prim of USD, an attribute that is read, text, and a bracket."""
 
 
 def _usd(text: str) -> Iterator[Link]:
     """Prims of USD as text that have a mass and a diagonal inertia; by their names."""
-    text = re.sub(r'(?s)("[^"\n]*")|#[^\n]*|/\*.*?\*/', r"\1", text)
+    text = re.sub(r'(?s)""".*?"""|("[^"\n]*")|#[^\n]*|/\*.*?\*/', r"\1", text)
     named = re.findall(r"(?m)(?:^\s*|\bphysics:|\bphysxRigidBody:)(\w+)\s*=", text)
     _require_spelt("USD", named, (*_USD_NAMES, *_STAGE))
-    units = {key: exact(value) for key, value in re.findall(rf"\b({'|'.join(_STAGE)})\s*=\s*([.\d][-+.\deE]*)", text)}
-    starts = [*_PRIM.finditer(text)]
-    for index, prim in enumerate(starts):
-        end = starts[index + 1].start() if index + 1 < len(starts) else len(text)
-        values = {key: value.strip("()") for key, value in _USD.findall(text[prim.end() : end])}
+    units = dict(re.findall(rf"\b({'|'.join(_STAGE)})\s*=\s*\"?([-+.\w]+)", text))
+    prims: list[tuple[str, dict[str, str]]] = []
+    around: list[dict[str, str]] = [{}]
+    new: dict[str, str] | None = None
+    parentheses = 0
+    for kind, name, key, value, bracket in _TOKEN.findall(text):
+        if kind:
+            new = {}
+            prims += [] if kind == "class" else [(name, new)]
+        elif key:
+            around[-1][key] = value.strip("()")
+        elif bracket == "{":
+            around.append(around[-1] if new is None or parentheses else new)
+            new = new if parentheses else None
+        elif bracket == "}":
+            around = around[:-1] or [{}]
+        else:
+            parentheses += {"(": 1, ")": -1}.get(bracket, 0)
+    yield from _of_prims(prims, units)
+
+
+def _of_prims(prims: Sequence[tuple[str, Mapping[str, str]]], units: Mapping[str, str]) -> Iterator[Link]:
+    """The bodies among prims, with the gravity of the scene."""
+    scene = {key: value for _, values in prims for key, value in values.items() if key.startswith("gravity")}
+    for name, values in prims:
         if {"mass", "diagonalInertia"} <= values.keys():
-            yield prim[1], partial(_prim, prim[1], values, units)
+            yield name, partial(_prim, name, {**values, **scene}, {**_STAGE, **units})
 
 
-def _prim(name: str, values: Mapping[str, str], units: Mapping[str, Fraction]) -> BodyInFile:
-    length, kilogram = units.get("metersPerUnit", Fraction(1, 100)), units.get("kilogramsPerUnit", Fraction(1))
+def _prim(name: str, values: Mapping[str, str], units: Mapping[str, str]) -> BodyInFile:
     numbers = _Numbers(f"prim {name}")
+    length, kilogram = (numbers.one(units[key], key) for key in ("metersPerUnit", "kilogramsPerUnit"))
     parts = [*values["diagonalInertia"].replace(",", " ").split(), "0", "0", "0"]
     diagonal = numbers.some(values["diagonalInertia"], "diagonalInertia", 3)
     if "inf" in values.get("centerOfMass", "") or not any(diagonal):
@@ -821,13 +848,17 @@ def _prim(name: str, values: Mapping[str, str], units: Mapping[str, Fraction]) -
     x, y, z = (value * length for value in numbers.three(values.get("centerOfMass"), "centerOfMass", "0 0 0"))
     mass = numbers.one(values["mass"], "mass") * kilogram
     free = values.get("disableGravity", "0").lower() in ("1", "1.0", "true")
-    earth = -EARTH[2] / length  # also where the scene has -inf
-    gravity = (Fraction(0), Fraction(0), Fraction(0) if free else -units.get("gravityMagnitude", earth) * length)
-    return BodyInFile(name, mass, (x, y, z), (a, b, c, d, e, f), slack * scale, gravity=gravity)
+    magnitude = values.get("gravityMagnitude", "-inf")  # as on Earth
+    size = -EARTH[2] if magnitude.startswith("-") else numbers.one(magnitude, "gravityMagnitude") * length
+    down = numbers.three(values.get("gravityDirection"), "gravityDirection", "0 0 0")
+    if not any(down):
+        down = vector([-int(axis == units["upAxis"]) for axis in "XYZ"], "upAxis")
+    gx, gy, gz = ((0 if free else size) * part for part in _unit(down))
+    return BodyInFile(name, mass, (x, y, z), (a, b, c, d, e, f), slack * scale, gravity=(gx, gy, gz))
 
 
 _BINARY_USD = (b"PXR-USDC", b"PK\x03\x04")
-_COMPOSED = re.compile(rb"\b(references|payload|subLayers|inherits|variantSet)\b")
+_COMPOSED = re.compile(rb"\b(references|payload|subLayers|inherits|variantSet|physics:\w+\.timeSamples)\b")
 """Composition of a prim of USD from several layers."""
 
 
@@ -837,7 +868,7 @@ def composed_usd(path: Path) -> Iterator[Link]:
         from pxr import Tf, Usd, UsdGeom, UsdPhysics
     except ImportError:
         raise InputError(
-            f"{path} is binary USD, or refers to other layers.",
+            f"{path} is binary USD, has time samples, or refers to other layers.",
             "Install usd-core: pip install 'heavytop[engines]'; or flatten it: usdcat --flatten FILE -o FILE.usda.",
         ) from None
     try:
@@ -848,20 +879,19 @@ def composed_usd(path: Path) -> Iterator[Link]:
     if faults:
         raise InputError(f"USD refuses {path}: {'; '.join(faults)[:200]}.", "Correct the file or its layers.")
     units = {
-        "metersPerUnit": exact(repr(UsdGeom.GetStageMetersPerUnit(stage))),
-        "kilogramsPerUnit": exact(repr(UsdPhysics.GetStageKilogramsPerUnit(stage))),
+        "metersPerUnit": repr(UsdGeom.GetStageMetersPerUnit(stage)),
+        "kilogramsPerUnit": repr(UsdPhysics.GetStageKilogramsPerUnit(stage)),
     }
-    for prim in stage.Traverse():
-        magnitude = prim.GetAttribute("physics:gravityMagnitude").Get()
-        if magnitude is not None and 0 <= magnitude < float("inf"):
-            units["gravityMagnitude"] = exact(_printed(magnitude))
+    if stage.HasAuthoredMetadata("upAxis"):
+        units["upAxis"] = UsdGeom.GetStageUpAxis(stage)
+    prims = []
     for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
         attributes = {name: prim.GetAttribute(f"physics:{name}") for name in _USD_NAMES[:-1]}
         attributes["disableGravity"] = prim.GetAttribute("physxRigidBody:disableGravity")
         first = {name: part.Get(Usd.TimeCode.EarliestTime()) for name, part in attributes.items()}
         values = {name: _printed(value) for name, value in first.items() if attributes[name].HasAuthoredValue()}
-        if {"mass", "diagonalInertia"} <= values.keys():
-            yield prim.GetName(), partial(_prim, prim.GetName(), values, units)
+        prims.append((prim.GetName(), values))
+    return _of_prims(prims, units)
 
 
 def _printed(value: Any) -> str:

@@ -474,6 +474,10 @@ READ: dict[str, tuple[tuple[str, str | bytes], str]] = {
         ("usda", SCENE.format('162\n string paths = "/s/*/a"', "float user:Mass = 3\n physics:centerOfMass")),
         "0.1 0 0.2 2 0.03 0.05 0.04 1.62",
     ),
+    "a shape within a body of USD": (
+        ("usda", SCENE.format("162", 'def "c" (doc = "{") {\n physics:mass = 7\n}\n physics:centerOfMass')),
+        "0.1 0 0.2 2 0.03 0.05 0.04 1.62",
+    ),
     "earth in USD": (("usda", SCENE.format("-inf", "physics:centerOfMass")), "0.1 0 0.2 2 0.03 0.05 0.04 9.81"),
     "no gravity in USD": (
         ("usda", SCENE.format("162", "physxRigidBody:disableGravity = 1\n physics:centerOfMass")),
@@ -576,6 +580,14 @@ REFUSED = {
     "a bound": (("xml", mjcf(SIX).replace("<world", '<compiler boundinertia=".2"/><world')), "boundinertia"),
     "global": (in_mjcf(BALL, '<compiler coordinate="global"/>'), "MuJoCo 2.3.3"),
     "fused": (in_mjcf(BALL, '<compiler fusestatic="true"/>'), "fusestatic"),
+    "y up in USD": (
+        ("usda", SCENE.format("9.81", "physics:centerOfMass").replace("(", '(\n upAxis = "Y"', 1)),
+        "along -z; got 0, -0.0981, 0",
+    ),
+    "x down in USD": (
+        ("usda", SCENE.format("1\n physics:gravityDirection = (2, 0, 0)", "physics:centerOfMass")),
+        "along -z; got 0.01, 0, 0",
+    ),
     "gravity along y": (in_mjcf(BALL, '<option gravity="0 -9.81 0"/>'), "--gravity"),
     "no boolean": (in_sdf('degrees="yes"'), "degrees must be true or false; got 'yes'"),
     "quaternion": (in_sdf('rotation_format="quat_xyzw" degrees="true"', "0 0 0 1"), "without degrees"),
