@@ -18,7 +18,7 @@ from heavytop.report.document.document import MOST_PLOTS, Card, Headline, In, Se
 from heavytop.report.document.kind import document
 from heavytop.report.document.svg import apart, decades, finish, new_axes
 from heavytop.report.render import plots
-from heavytop.report.render.page import MOST_ROWS, digits_headline, digits_until, laws_headline
+from heavytop.report.render.page import MOST_ROWS, digits_headline, digits_until, laws_headlines
 from support.report_helpers import HOSTILE, TIMES, claim_rows, error, full_report, power, row, work
 from support.reports import compare, html, replace, store
 
@@ -380,11 +380,11 @@ def test_whether_planted_faults_are_told_opens_the_page_of_growth(law: str, told
     subject = replace(faulty.key.subject, bias="1e-12")
     faulty = replace(faulty, key=replace(faulty.key, subject=subject))
     assert (
-        laws_headline([healthy, faulty]).text
+        laws_headlines([healthy, faulty])[-1].text
         == f"Errors along the flow grow like t^1.5; {told} of 1 with I1 off by 1e-12 show another law."
     )
     mine = replace(faulty, key=replace(healthy.key, subject=replace(healthy.key.subject, name="mine:rk")))
-    assert laws_headline([healthy, mine]) == Headline(f"Errors of mine:rk along the flow grow like {law}.")
+    assert laws_headlines([healthy, mine]) == [Headline(f"Errors of mine:rk along the flow grow like {law}.")]
 
 
 def test_regular_and_unstable_motions_stand_side_by_side_at_the_head_of_the_page_of_growth() -> None:
@@ -394,7 +394,7 @@ def test_regular_and_unstable_motions_stand_side_by_side_at_the_head_of_the_page
         ([unstable, unstable, regular], "like t^1.5 (1 of 3 ensembles) or exponentially (2)."),
         ([unstable, regular, regular, regular], "like t^1.5 (3 of 4 ensembles)."),
     ):
-        assert laws_headline(rows).text == f"Errors along the flow grow {said}"
+        assert laws_headlines(rows)[0].text == f"Errors along the flow grow {said}"
 
 
 def headline_of(kind: str, rows: list[Row]) -> str:

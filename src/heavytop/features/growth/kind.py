@@ -27,7 +27,7 @@ from heavytop.precision import decimal_text, exact, parse, physical, rounded, ti
 from heavytop.records import HEYOKA, NOT_CARRIED, Beside, Law, Metric, Quantity, Row, by_name
 from heavytop.report.document.document import Block, Cell, Chart, computed_by, integral_text, short
 from heavytop.report.document.document import Table as Cells
-from heavytop.report.render.page import laws_headline
+from heavytop.report.render.page import laws_headlines
 from heavytop.report.render.plots import digits
 from heavytop.report.render.plots import growth as over_time
 from heavytop.report.render.terminal import laws_in_short
@@ -173,9 +173,8 @@ class Growth(Kind):
         return _row(task, [start for _, start in members], motions, scorers, compared, seconds, rounding)
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
-        """The headline, the laws in brief, and a table with a line for each law."""
-        if (headline := laws_headline(rows)) is not None:
-            yield headline
+        """The headlines, the laws in brief, and a table with a line for each law."""
+        yield from laws_headlines(rows)
         yield from laws_in_short(rows)
         chaotic = any(law.growth == "exponential" for row in rows for law in row.laws.values())
         notes = ["Detects: the smallest relative fault per step that these starts distinguish from rounding noise."]

@@ -18,7 +18,7 @@ import numpy
 
 from heavytop import arguments
 from heavytop.arguments import Number
-from heavytop.display import Tabular, TitledTable
+from heavytop.display import Tabular, TitledTable, plural
 from heavytop.errors import InputError, OutOfReach, quoted, refusal
 from heavytop.integrate.frames import Setup
 from heavytop.integrate.registry import control_name, expected_steps, named, propagator
@@ -100,7 +100,9 @@ class Power(Tabular):
         said = f"{'passes' if self.passes else 'fails'}: its largest error is {self.error:.2g}"
         notes = [f"a correct run {said if isfinite(self.error) else f'fails: it does not reach t = {end}'}"]
         notes += [f"{name} is not planted: {why}" for name, why in self.left_out.items()]
-        title = f"A test up to t = {end} with tolerance {self.tolerance:.2g}"
+        detected = sum(fault.detected_from is not None for fault in self.faults)
+        test = f"A test up to t = {end} with tolerance {self.tolerance:.2g}"
+        title = f"{test} detects {detected} of {plural(len(self.faults), 'planted fault')}"
         return TitledTable(title, ("planted fault", "detected from t", "widest tolerance"), rows, notes)
 
 

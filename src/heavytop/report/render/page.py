@@ -470,21 +470,20 @@ def _motion(row: Row) -> list[Cell]:
     ]
 
 
-def laws_headline(rows: Sequence[Row]) -> Headline | None:
-    """The commonest laws of runs without planted faults, of third-party integrators if any, and the number of planted
-    faults with another law.
+def laws_headlines(rows: Sequence[Row]) -> list[Headline]:
+    """The commonest laws of runs without planted faults, of third-party integrators if any: of errors along the flow,
+    then of first integrals, with the number of planted faults that show another law.
     """
     theirs = [row for row in rows if row.key.subject.name not in (HEYOKA, MULTIWORD)]
     healthy = theirs or [row for row in rows if not row.key.subject.variant] or rows
     condition = " with default options" if not theirs and len(healthy) < len(rows) else ""
-    parts = [_followed(healthy, drifts, condition) for drifts in (False, True)]
-    sentence = ", ".join(part for part in parts if part)
+    sentences = [text for text in (_followed(healthy, False, ""), _followed(healthy, True, condition)) if text]
     faults = [row for row in rows if row.key.subject.bias]
     distinguished = sum(_shows_other_law(row, healthy) for row in faults)
-    if faults and sentence:
+    if faults and sentences:
         bias = " and ".join(dict.fromkeys(f"I1 off by {row.key.subject.bias}" for row in faults))
-        sentence += f"; {distinguished} of {len(faults)} with {bias} show another law"
-    return Headline(f"{sentence[0].upper()}{sentence[1:]}.") if sentence else None
+        sentences[-1] += f"; {distinguished} of {len(faults)} with {bias} show another law"
+    return [Headline(f"{text[0].upper()}{text[1:]}.") for text in sentences]
 
 
 def _followed(rows: Sequence[Row], drifts: bool, condition: str) -> str:

@@ -126,8 +126,8 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
 
     if len(first) <= MOST_ROWS:
         held = list(counted(first))
-        blocks = document(replace(report, rows=held), kinds, In.SHORT)
-        answers += headlines(blocks, kinds)
+        blocks, full = (document(replace(report, rows=held), kinds, shown) for shown in (In.SHORT, In.FULL))
+        answers += headlines(blocks, kinds) or headlines(full, kinds)[:1]
         others = ([block for block in blocks if block not in answers] for blocks in blocks.values())
         parts = [_lines(_shown(blocks, brief=True)) for blocks in (answers, *others)]
         parts += [wrapped(sentence)[:_MOST_OF_ONE] for sentence in [unsupported(held)] if sentence]

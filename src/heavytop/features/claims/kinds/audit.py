@@ -114,9 +114,10 @@ class AuditKind(Kind):
         elif entries:
             values = {row.metrics[EXPECTED.text].value for row in entries}
             word = "failed" if "0" in values else "undecided" if UNRESOLVED in values else ""
-            yield Headline(_of_library(entries), Word(word) if word else None)
+            yield Headline(_of_library(entries), Word(word) if word else None, _EVERYWHERE)
         if entries:
-            yield Note(_of_library(entries), shown=In.SHORT | In.FULL | In.PAGE if paper else In.SHORT)
+            if paper:
+                yield Note(_of_library(entries), shown=_EVERYWHERE)
             worst_first = sorted(entries, key=lambda row: ("refuted", "undecided", "holds").index(_verdict(row)[0]))
             yield Table("Library of claims", _COLUMNS, [*map(_entry, worst_first)], shown=In.PAGE)
         if paper:
