@@ -3,12 +3,12 @@
 from heavytop.integrate.peers.double import Solution, double_peer
 
 
-def _solve(given):
-    """From what is given (start and times as arrays, the field, the step) to what was solved."""
-    field = given.field
-    y, time, steps, states = given.start.tolist(), 0.0, 0, []
-    for end in given.times.tolist():
-        count = max(1, round(abs(end - time) / given.control))
+def _solve(request):
+    """The solution of a request (start and times as arrays, the field, the step)."""
+    field = request.field
+    y, time, steps, states = request.start.tolist(), 0.0, 0, []
+    for end in request.times.tolist():
+        count = max(1, round(abs(end - time) / request.control))
         h = (end - time) / count
         for _ in range(count):
             k1 = field(y)

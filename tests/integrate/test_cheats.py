@@ -190,7 +190,7 @@ CHEATS = {
     "first_fine": ('coarse(lambda *_: counted("first") >= 4)', "the seconds are those of another run"),
     "known_start_fine": (
         "coarse(lambda start, times: start.omega[0].denominator >= 1000)",
-        "from a start units in the last place away, ends ",
+        "from a start that differs in the last place, ends ",
     ),
     "memory": ("remembering(lambda start: start)", "it keeps results between calls"),
     "rough_memory": (

@@ -185,7 +185,7 @@ def export(
 ) -> int:
     """Write a report in the format of another tool.
 
-    Of each number smaller is better: log10 of error and drift, exponents of growth laws, seconds.
+    Smaller is better for each number: log10 of error and drift, exponents of growth laws, seconds.
     """
     from heavytop.api.reports import read_report
 

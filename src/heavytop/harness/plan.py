@@ -442,7 +442,7 @@ def positive(texts: list[str], what: str) -> list[Fraction]:
     """Exact numbers; raises InputError unless they are positive and grow."""
     values = [physical(text, what) for text in texts]
     if not values or values != sorted(set(values)) or values[0] <= 0:
-        raise InputError(f"{what} = {texts}", "Give positive numbers in increasing order, each once.")
+        raise refusal(what, "positive and increasing", ", ".join(texts) or "nothing", "Give each number once.")
     return values
 
 

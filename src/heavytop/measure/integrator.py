@@ -123,7 +123,7 @@ def tried(
     kept = alone if allowed is None or _distance(alone, judged) <= allowed else again
     figures, runs = timed(lambda j: integrate(kept.times, _nudged(problem, j)), how)
     for run in runs:
-        _require_near(name, run, judged, allowed, "from a start units in the last place away", len(times))
+        _require_near(name, run, judged, allowed, "from a start that differs in the last place", len(times))
     if len(runs) > 1:
         _require_computed(name, integrate, problem, runs)
     compiling = max(0.0, judged.seconds["run"] - again.seconds["run"]) + max(0.0, alone.seconds["run"] - figures["run"])

@@ -27,7 +27,7 @@ from typing import Any
 
 from flint import acb, arb
 
-from heavytop.errors import InputError, prefixed
+from heavytop.errors import InputError, prefixed, refusal
 from heavytop.exact.cases.algebraic_starts import Algebraic
 from heavytop.exact.closed_form import ClosedForm, balls, cached_per_precision, once, sign, solved
 from heavytop.exact.flint.balls import (
@@ -335,7 +335,7 @@ class AlgebraicDokshevich(_Moving, Algebraic):
                 "Give positive moments, the second between the others.",
             )
         if not 0 < abs(self.place) < 1:
-            raise InputError(f"place = {shown(self.place)}.", "Give a number between 0 and 1, or its negative.")
+            raise refusal("place", "between 0 and 1, or between -1 and 0", shown(self.place), "Give 1/2, say.")
 
     @property
     def share(self) -> Fraction:

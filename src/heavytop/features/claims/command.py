@@ -113,7 +113,7 @@ def figures(
     """
     out = absolute(out)
     require_new(out)
-    with writable(out):
+    with writable(out, "Give a writable --out."):
         for file in _drawn(out, report):
             print(file)
     return ExitCode.GOOD

@@ -116,6 +116,6 @@ def _write_report(report: Report, out: Path) -> None:
     """The report that `compare` and `show` read."""
     from heavytop.report.store import store
 
-    with writable(out):
+    with writable(out, "Give a writable --out."):
         out.mkdir(parents=True, exist_ok=True)
         store.write(report, out)

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast
 import msgspec
 
 from heavytop import files
-from heavytop.errors import HeavyTopError, InputError, invalid, meant, prefixed, quoted
+from heavytop.errors import HeavyTopError, InputError, invalid, meant, prefixed, quoted, refusal
 from heavytop.features.claims.audit.components import UserComponent
 from heavytop.features.claims.audit.context import ClaimFile
 from heavytop.features.claims.audit.guard import Answer, AuditEnded, in_time, limit_process, no_memory, too_deep
@@ -83,7 +83,8 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> FileClaim | ValueC
     except (msgspec.ValidationError, RecursionError) as error:
         raise InputError(f"{where}: {_with_name(invalid(error, ClaimFile), claim)}.", _REMEDY) from None
     if content.kind not in _TABLES:
-        raise InputError(f"{where}: kind = {content.kind[:40]!r}.", f"Use {', '.join(_TABLES)} or value.")
+        rule = f"one of {', '.join(_TABLES)}, value"
+        raise refusal(f"{where}: kind", rule, repr(content.kind[:40]), _REMEDY)
     needed, claim_class = _TABLES[content.kind]
     if {name for name, _ in _TABLES.values() if getattr(content, name) is not None} != {needed}:
         raise InputError(f"{where}: kind {content.kind!r} needs the table [{needed}], and no other claim.", _REMEDY)
