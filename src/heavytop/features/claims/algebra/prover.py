@@ -331,14 +331,18 @@ class Region:
 
     def obstacle(self, values: Sequence[sympy.Expr]) -> str:
         """The obstacle to a proof that the values are real and continuous on the whole region."""
-        for value in values:
-            try:
-                obstacle = self.regularity.obstacle(self.field.enter(value))
-            except Unprovable as error:
-                obstacle = error.cause
-            if obstacle:
-                return obstacle
-        return ""
+        return next(filter(None, map(self._obstacle, values)), "")
+
+    def _obstacle(self, value: sympy.Expr) -> str:
+        """The obstacle of one value in the field, or else as written: its quotient may have other divisors."""
+        try:
+            obstacle = self.regularity.obstacle(self.field.enter(value))
+        except Unprovable as error:
+            obstacle = error.cause
+        is_power = value.is_Pow and value.exp.is_Integer
+        parts = value.args if value.is_Add or value.is_Mul else value.args[: int(is_power)]
+        is_finite = not is_power or value.exp > 0 or self.discharge(Need(ConditionKind.NONZERO, value.base))
+        return obstacle and (self.obstacle(parts) if parts and is_finite else obstacle)
 
     def divisors(self, *, forced: bool) -> Iterator[str]:
         """Divisors of the algebra that may be 0 on an open part of the region; forced: at any point of it."""

@@ -61,7 +61,7 @@ from heavytop.features.claims.audit.context import (
 )
 from heavytop.features.claims.audit.judge import Audit, Progress, StatementVerdict, judge, silent, verdict_of
 from heavytop.features.claims.audit.user_claims import OFF_SPHERE, Rate, UserIntegral
-from heavytop.top.equations import GYROSTAT, System, area, energy, gyrostat_energy
+from heavytop.top.equations import GYROSTAT, System, area, energy, gyrostat_energy, momentum_squared
 
 _OMEGA, _GAMMA = STATE[:3], STATE[3:]
 _ACROSS = _GAMMA[0] ** 2 + _GAMMA[1] ** 2
@@ -145,15 +145,20 @@ class UserComponent(UserIntegral):
             raise InputError("[component] gives a value and no reduced equation u'^2 = f(u).", remedy)
 
     def _levels(self) -> Iterator[Formula]:
-        """First integrals minus their values at the start."""
+        """First integrals minus their values at the start, and the components that stay 0 from it."""
         if not self.start:
             return
         about = self.about(None)
-        p = self.context.parameters(about)
+        p, rate = self.context.parameters(about), self._rate(about)
         standard = [(gyrostat_energy if about is GYROSTAT else energy)(p, STATE), area(p, STATE)]
+        standard += [e for e in (*_OMEGA, momentum_squared(p, STATE)) if sympy.cancel(rate(e)) == 0]
+        zeros = {x for x, part in zip(STATE, self.start, strict=True) if part.expression == 0}
+        while moving := {x for x in zeros if sympy.cancel(rate(x).subs(dict.fromkeys(zeros, 0))) != 0}:
+            zeros -= moving
         constants = [_read(text, self.context.names, "component.constants") for text in self._component.constants]
-        for formula in (*map(symbol, standard), *constants):
-            yield replace(formula, expression=formula.expression - self._at_start(formula.expression))
+        formulas = dict.fromkeys((*map(symbol, (*standard, *sorted(zeros, key=str))), *constants))
+        levels = (replace(part, expression=part.expression - self._at_start(part.expression)) for part in formulas)
+        yield from (level for level in levels if level not in self.where)
 
     def _at_start(self, e: sympy.Expr) -> sympy.Expr:
         return e.xreplace({x: part.expression for x, part in zip(STATE, self.start, strict=True)})
@@ -380,7 +385,11 @@ class UserComponent(UserIntegral):
         facts = (f, *(e for e in real if e in proven or self._divides(e, f)), *self._signed_factors(f))
         domain = Domain("f(u) > 0", 0, self._shortly_after(system), f"{u} is the component", facts)
         text = "t = F(u) is continuous, and F' is real and keeps its sign"
-        yield Statement("time", 1, "smooth", domain, sympy.Integer(0), text, Formulas(values, sampled=clock.needs))
+        # t is no function of a constant u
+        rates = [self._at_start(e) ** 2 for e in self._rates(system)[1:]] if self.start else [sympy.Integer(1)]
+        moves = frozenset(replace(need, shown=f"{u} is not constant") for need in _nonzero(sympy.Add(*rates)))
+        formulas = Formulas(values, moves, sampled=clock.needs)
+        yield Statement("time", 1, "smooth", domain, sympy.Integer(0), text, formulas)
 
     def _signed_factors(self, f: sympy.Expr) -> Iterator[sympy.Expr]:
         """The factors of a rational f(u) that have a known sign at the start, which they keep, times that sign."""

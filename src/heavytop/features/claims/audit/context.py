@@ -119,8 +119,8 @@ class IntegralTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class ComponentTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """[component]: a quantity u of the state and angles, claimed as functions of t.
 
-    reduced: f(u), the square of its rate.  constants: first integrals with the value of the start, besides energy and
-    area.  where: formulas that are 0 at every state of the claim.
+    reduced: f(u), the square of its rate.  constants: first integrals with the value of the start, besides energy,
+    area, |M|² and components of Ω.  where: formulas that are 0 at every state of the claim.
     """
 
     quantity: Text
