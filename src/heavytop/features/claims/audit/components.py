@@ -348,22 +348,21 @@ class UserComponent(UserIntegral):
     ) -> Iterator[list[sympy.Expr]]:
         """The relations that hold variables of u and the parts alone, then all of them.
 
-        All, where no component of the state is constant, may take minutes: then only where the residual is 0 at the
-        known states, with two derivatives.
+        All may take minutes: only where the others outnumber their further variables, and neither the residual
+        nor its first two derivatives are known to differ from 0 at a state.
         """
         variables = {z: z.free_symbols & frozenset(STATE) for z in zeros}
-        constant = set().union(*(x for x in variables.values() if len(x) == 1))
-        near = constant.union(*(e.free_symbols for e in (self.quantity.expression, *parts)))
+        near = set().union(*(x for x in variables.values() if len(x) == 1))
+        near |= set().union(*(e.free_symbols for e in (self.quantity.expression, *parts)))
         moving = [z for z in zeros if variables[z]]
-        close = [z for z in moving if variables[z] <= near]
-        if len(close) < len(moving):
-            yield close
-        if constant or not set().union(*variables.values()) >= set(STATE):
-            yield moving
-            return
+        far = [z for z in moving if not variables[z] <= near]
+        if far:
+            yield [z for z in moving if z not in far]
+            if len(far) <= len(set().union(*(variables[z] for z in far)) - near):
+                return
         first = rate(residual)
         points, residuals = self.at_states.samples, (residual, first, rate(first))
-        if all(evaluate(e, point, _BITS).contains(0) for e, point in product(residuals, points)):
+        if not any(is_exactly_zero(e, point) is False for e, point in product(residuals, points)):
             yield moving
 
     def _clock(self, f: sympy.Expr, system: System) -> Iterator[Statement]:
