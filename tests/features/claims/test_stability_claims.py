@@ -173,6 +173,8 @@ def test_no_verdict_on_a_random_steady_motion_contradicts_its_eigenvalues(seed: 
         ({"motion": {"omega": ["t", "0", "0"], "gamma": ["1", "0", "0"]}}, "constant in time"),
         ({"domain": "t>0"}, "about all times"),
         ({"system": "gyrostat", "top": top("3 2 1", "0 0 0", "0", rotor="1")}, "must be"),
+        ({"top": top("3 2 1", "0 0 0", "0", rotor="1")}, "top.rotor is that of a gyrostat"),
+        ({"kind": "motion", "stable": None, "system": "heavy_top", "top": top(rotor="1")}, "top.rotor is that"),
         ({"top": top("3 2 1 1/9 0 0", "0 0 0", "0")}, "principal"),
     ],
 )

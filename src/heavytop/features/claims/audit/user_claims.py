@@ -111,6 +111,9 @@ class FileClaim(ABC):
         default = HEAVY_TOP if self.context.carried is None else HEAVY_GYROSTAT
         about = of_file(requested, self.content.system, default)
         self.context.parameters(about)
+        is_without = about is HEAVY_TOP and (self.content.system is not None or self.kind == "stability")
+        if is_without and self.context.rotor is not None:
+            raise InputError("The claim is about heavy_top, and top.rotor is that of a gyrostat.", "Leave it out.")
         return about
 
     def audit(self, about: System, progress: Progress = silent) -> Audit:
