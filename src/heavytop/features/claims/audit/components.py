@@ -348,22 +348,25 @@ class UserComponent(UserIntegral):
     ) -> Iterator[list[sympy.Expr]]:
         """The relations that hold variables of u and the parts alone, then all of them.
 
-        All may take minutes: only where the others outnumber their further variables, and neither the residual
-        nor its first two derivatives are known to differ from 0 at a state.
+        All may take minutes: only where the others outnumber their further variables and, unless u is a component of
+        the state and another one constant, neither the residual nor its first two derivatives are known to differ from
+        0 at a state.
         """
         variables = {z: z.free_symbols & frozenset(STATE) for z in zeros}
-        near = set().union(*(x for x in variables.values() if len(x) == 1))
-        near |= set().union(*(e.free_symbols for e in (self.quantity.expression, *parts)))
+        constant = set().union(*(x for x in variables.values() if len(x) == 1))
+        near = constant.union(*(e.free_symbols for e in (self.quantity.expression, *parts)))
         moving = [z for z in zeros if variables[z]]
         far = [z for z in moving if not variables[z] <= near]
         if far:
             yield [z for z in moving if z not in far]
             if len(far) <= len(set().union(*(variables[z] for z in far)) - near):
                 return
-        first = rate(residual)
-        points, residuals = self.at_states.samples, (residual, first, rate(first))
-        if not any(is_exactly_zero(e, point) is False for e, point in product(residuals, points)):
-            yield moving
+        if far or not constant or self.quantity.expression not in STATE:
+            first = rate(residual)
+            points, residuals = self.at_states.samples, (residual, first, rate(first))
+            if any(is_exactly_zero(e, point) is False for e, point in product(residuals, points)):
+                return
+        yield moving
 
     def _clock(self, f: sympy.Expr, system: System) -> Iterator[Statement]:
         """F is continuous and F' real and of one sign where u moves: f(u) > 0 there, as are radicands that divide f.
