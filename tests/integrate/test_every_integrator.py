@@ -41,7 +41,8 @@ ERROR = {"splitting:2": 1e-3, "splitting:4": 1e-7, "scipy:Radau": 1e-6}
 
 def call(name: str, top: HeavyTop, start: State, times: Sequence[Fraction], system: System = HEAVY_TOP) -> Trajectory:
     """One run in double, through the very call that everything else takes."""
-    options: dict[str, Any] = {"step": F(1, 64)} if name.startswith("splitting") else {}
+    fixed = name in INTEGRATORS and INTEGRATORS[name].control == "step"
+    options: dict[str, Any] = {"step": F(1, 64)} if fixed else {}
     if name.startswith("scipy:Radau"):
         options = {"tolerance": F(1, 10**8)}
     which = Fault("none").integrator if name == "planted fault" else name
@@ -302,8 +303,8 @@ PEERS = [name for name in INTEGRATORS if name not in ("heyoka", "mpmath:odefun")
 
 
 def setting_of(name: str) -> tuple[str, Fraction]:
-    if name.startswith("splitting"):
-        return "step", F(1, 1 << {"2": 17, "4": 9, "8": 5}[name[-1]])
+    if INTEGRATORS[name].control == "step":
+        return "step", F(1, 1 << {"splitting:2": 17, "splitting:8": 5}.get(name, 9))
     return "tolerance", F(1, 10**8) if name == "scipy:Radau" else F(1, 10**12)
 
 

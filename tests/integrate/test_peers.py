@@ -59,6 +59,7 @@ def test_more_times_add_no_steps(name: str, step: bool) -> None:
     [
         ([[0.0] * 6, [float("nan")] * 6, [0.0] * 6], Outcome.NON_FINITE, 1),
         ([[0.0] * 6, [float("inf")] * 6], Outcome.NON_FINITE, 1),
+        ([[float("nan")] * 6], Outcome.NON_FINITE, 0),
         ([[0.0] * 6], Outcome.STEP_LIMIT, 1),
         ([], Outcome.STEP_LIMIT, 0),
         ([[0.0] * 6] * 3, Outcome.SUCCESS, 3),
@@ -69,7 +70,8 @@ def test_what_a_library_gives_back_is_judged(states, outcome: Outcome, count: in
     run = fake(CASES["euler"].top, CASES["euler"].start, TIMES, DOUBLE)
     assert run.outcome is outcome
     assert len(run.states) == len(run.times) == count
-    assert run.time_reached == (5 if outcome is Outcome.SUCCESS else Fraction(1, 2))
+    reached = 5 if outcome is Outcome.SUCCESS else 0 if count < len(states) == 1 else Fraction(1, 2)
+    assert run.time_reached == reached
 
 
 def test_fewer_states_without_an_outcome_are_incomplete() -> None:

@@ -200,10 +200,10 @@ class Outcome(Enum):
             Outcome.SUCCESS: "reached every time asked for",
             Outcome.STEP_LIMIT: "stopped at the step limit before the last time",
             Outcome.NON_FINITE: "stopped: the state was no longer finite",
-            Outcome.STEP_TOO_SMALL: "stopped: the step no longer moves the time",
-            Outcome.CAPACITY: "stopped: the numbers outgrew the words that were chosen for them",
-            Outcome.FAILED: "stopped: the integrator said that it failed",
-            Outcome.INCOMPLETE: "said to have succeeded, but gave fewer times than were asked for",
+            Outcome.STEP_TOO_SMALL: "stopped: a step no longer changes the time",
+            Outcome.CAPACITY: "stopped: numbers exceeded the range of the words chosen for them",
+            Outcome.FAILED: "stopped: the integrator reported a failure",
+            Outcome.INCOMPLETE: "reported success, but returned fewer times than requested",
         }[self]
 
 

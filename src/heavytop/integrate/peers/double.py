@@ -273,15 +273,16 @@ def _trajectory(
     states = _states(name, solved.states, len(times), request.width)
     finite = numpy.isfinite(states).all(axis=1)
     count = len(states) if finite.all() else int(finite.argmin())
-    reached = times[-1] if count == len(times) else solved.reached
-    outcome = solved.outcome if count == len(states) and numpy.isfinite(reached) else Outcome.NON_FINITE
+    end = abs(times[count]) if count < len(states) else math.inf
+    known, last = abs(solved.reached) < end, times[count - 1] if count else 0.0
+    outcome = solved.outcome if known and count == len(states) else Outcome.NON_FINITE
     return Trajectory(
         problem,
         name,
         tuple(exact(time) for time in times[:count]),
         tuple(of_quaternion(name, problem, state) if request.width == 7 else state for state in states[:count]),
         Outcome.SUCCESS if count == len(times) else outcome,
-        exact(reached if numpy.isfinite(reached) else times[count - 1] if count else 0.0),
+        exact(solved.reached if known and count < len(times) else last),
         solved.steps,
         order,
         seconds,
