@@ -235,7 +235,7 @@ def test_a_sleeping_top_is_right_in_any_columns(tmp_path: Path) -> None:
         ({"omega_space": "0,0,3"}, "omega and omega_space both give"),
         (
             {"header": "t,qw,qx,qy", "rows": "1,0,0,1"},
-            "columns of the quaternion are incomplete: component z is missing",
+            "columns of quaternion are incomplete: component z is missing",
         ),
         ({"header": "t,a,b,c,d"}, "'a' to 'd' look like an attitude"),
         ({"header": "t,psi,theta,phi,n", "sequence": "ZXZ"}, "ψ, θ, φ do not say which angle of ZXZ is the first"),

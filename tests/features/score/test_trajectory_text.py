@@ -291,6 +291,7 @@ def test_what_is_of_another_quantity_is_left_out() -> None:
     ("header", "said"),
     [
         ("t [weeks];omega1;omega2;omega3;gamma1;gamma2;gamma3", "t in weeks"),
+        ("t [m];omega1;omega2;omega3;gamma1;gamma2;gamma3", "t in m"),
         ("t [s];omega1/(gon/s);omega2/(gon/s);omega3/(gon/s);gamma1;gamma2;gamma3", "omega in gon/s"),
         ("t [s];omega1 [rad/s];omega2 [1/s];omega[3];gamma1;gamma2;gamma3", ""),
     ],

@@ -100,7 +100,12 @@ _LENGTHS = ("m", *_METRE)
 _OMEGA = ("omega", "omega_space", "framed")
 _UNITS = {"t": _SECOND, **dict.fromkeys(_OMEGA, _RATE), "position": _METRE, "rotation_vector": _ANGLE}
 """Units of a header in those of the data: s, rad/s and rad (as multiples of π; mrad/s aside), and m."""
-_OF_DATA = ("", "1", "-", "s", "sec", "second", "seconds", "m", "rad", "1/s", *(f"rad{each}" for each in _A_SECOND))
+_OF_DATA = {
+    "t": ("s", "sec", "second", "seconds"),
+    "position": ("m",),
+    "rotation_vector": ("rad",),
+    **dict.fromkeys(_OMEGA, ("rad", "1/s", *(f"rad{second}" for second in _A_SECOND))),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,7 +258,7 @@ def _in_one_unit(units: Mapping[str, set[Unit]]) -> dict[str, Unit]:
 
 def _unknown(quantity: str, units: set[Unit]) -> list[str]:
     """The units of a quantity that are neither those of the data nor converted to them."""
-    names = sorted(unit.name for unit in units if unit.size == 1 and unit.name not in _OF_DATA)
+    names = sorted({unit.name for unit in units if unit.size == 1} - {"", "1", "-", *_OF_DATA[quantity]})
     return [f"{_words(quantity)} in {name}" for name in names if name not in _AXES and not name.isdigit()]
 
 
@@ -300,7 +305,7 @@ def ordered_places(
     if missing or extra:
         fault = f"component {missing[0]} is missing" if missing else f"component {extra[0]} has no counterpart"
         remedy = "Give every component, or another name to a column of something else."
-        raise InputError(f"The columns of the {_words(quantity)} are incomplete: {fault}.", remedy)
+        raise InputError(f"The columns of {_words(quantity)} are incomplete: {fault}.", remedy)
     return [(name, components[name]) for name in names]
 
 
