@@ -11,6 +11,7 @@ from PIL import Image
 import heavytop as ht
 from heavytop.display import path_picture
 from heavytop.errors import InputError
+from heavytop.report.document.document import integral_text
 from support.helpers import START as TUMBLING
 from support.helpers import TOP as GENERIC
 
@@ -108,11 +109,11 @@ def test_drift_digits_and_error_are_those_of_the_score(run, known) -> None:
     found = {line.get_label(): np.nanmax(line.get_ydata()) for line in axes.lines}
     for part in ("along", "across"):
         assert abs(found[part] - np.log10(float(score.distance[part].max))) < 0.3
-    drifts = ht.drift(run)
+    drifts = {integral_text(name): drift for name, drift in ht.drift(run).items()}
     axes = ht.plot.drift(run)
     for line in axes.lines:
         name, _, zero = line.get_label().partition(":")
-        largest = float(drifts[name.replace(" ", "_")].max.value)
+        largest = float(drifts[name].max.value)
         assert (largest == 0) == bool(zero)
         assert zero or abs(np.nanmax(line.get_ydata()) - np.log10(largest)) < 1e-3
     quad = ht.propagate(LAGRANGE, START, TIMES, ht.QUAD)

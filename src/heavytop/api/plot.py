@@ -37,6 +37,7 @@ from heavytop.files import writable
 from heavytop.integrate.trajectory import Trajectory
 from heavytop.measure.scorer import Logs, sample_drifts, sample_errors
 from heavytop.precision import exact
+from heavytop.report.document.document import integral_text
 from heavytop.report.document.svg import COLOURS, decades, new_figure
 from heavytop.top.bodies import Body
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, NAMES, Parameters, component
@@ -293,7 +294,7 @@ def drift(run: Trajectory, axes: Axes | None = None) -> Axes:
     indices = every(len(run.states))
     drawn, times = _flat(axes), np.array([float(exact(run.times[index])) for index in indices])
     curves = sample_drifts(run.problem, [exact(run.times[index]) for index in indices], exact_states(run, indices))
-    _logarithmic(drawn, times, {name.replace("_", " "): logs for name, logs in curves.items()})
+    _logarithmic(drawn, times, {integral_text(name): logs for name, logs in curves.items()})
     drawn.set_ylabel("|I(t) − I(0)|")
     drawn.set_title(f"drift in {run.problem.precision.name}, {run.integrator}", fontsize="medium")
     return drawn

@@ -38,7 +38,10 @@ _AGAINST = Against("proven", "known: validated enclosure of each step from where
 ERROR = Quantity("error", statistic="final")
 """Of the run of a method that keeps a memory, at its end, largest component."""
 _LARGEST = local_error.LOCAL_ERROR.over("max").text
-_UNITS = "Error in eps of the format times the largest component of the state; the order as the steps show it."
+_NOTES = (
+    "Each compared with the proven motion from where it starts.",
+    "Error in eps of the format times the largest component of the state; the order as the steps show it.",
+)
 
 
 class LocalErrorTable(PlanTable, tag=NAME):
@@ -109,8 +112,7 @@ class LocalErrorKind(Kind):
             yield Headline(_said(max(shown, key=_size)))
         yield from (Note(_said(row), shown=In.SHORT) for row in shown)
         columns = "case", "format", "steps", "largest", "rms", "order observed", "of runs", "declared", "outcome"
-        title = "Single steps, each against the proven motion from where it starts"
-        yield Cells(title, columns, [_cells(row) for row in rows], [_UNITS], shown=In.FULL | In.PAGE)
+        yield Cells("Single steps", columns, [_cells(row) for row in rows], _NOTES, shown=In.FULL | In.PAGE)
 
 
 def _of_runs(task: Task, integrator: Integrator) -> Row:

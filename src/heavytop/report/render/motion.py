@@ -343,7 +343,8 @@ def motion_text(motion: Motion, table: MotionTable) -> RenderableType:
     """States, further requested outputs, and the drift of the first integrals."""
     run = motion.trajectory
     precision = run.problem.precision
-    head = f"{run.problem.system.name} in {precision.name} ({precision.bits} bits): {run.outcome.message}"
+    head = f"{run.problem.system.name} in {precision.name} ({precision.bits} bits) by {run.integrator}"
+    head += f": {run.outcome.message}"
     if run.order:  # some peers report neither
         head += f", {plural(run.steps, 'step')} of order {run.order}"
     parts: list[RenderableType] = [Text(head), *_attitude_at_start(table)]
