@@ -146,7 +146,7 @@ def _xml(path: Path, content: bytes) -> Iterator[Link]:
         element.tag = element.tag.rpartition("}")[2]  # a namespace changes no meaning
     for element in root.iter():
         _require_spelt(
-            f"<{element.tag}>", [*element.attrib, *(part.tag for part in element)], _READ.get(element.tag, ())
+            f"<{element.tag}>", [*element.attrib, *(child.tag for child in element)], _READ.get(element.tag, ())
         )
     if root.tag in ("mujoco", "mujocoinclude"):
         return _mjcf(path, root)
@@ -184,7 +184,7 @@ _Around = Mapping["Element", "Element"]
 
 
 def _around(root: Element) -> _Around:
-    return {part: element for element in root.iter() for part in element}
+    return {child: element for element in root.iter() for child in element}
 
 
 def _of_links(root: Element, reader: Callable[[str, Element, Element, _Around], BodyInFile]) -> Iterator[Link]:
@@ -216,9 +216,9 @@ class _Numbers:
                 "Expand the file first: xacro FILE -o FILE.urdf.",
             )
         with prefixed(f"{self.where}: {what} = {quoted(text)}"):
-            return [self._one(part) for part in text.replace(",", " ").split()]
+            return [self._parsed(word) for word in text.replace(",", " ").split()]
 
-    def _one(self, text: str) -> Fraction:
+    def _parsed(self, text: str) -> Fraction:
         value = exact(text)
         _, _, decimals = text.lower().partition("e")[0].partition(".")
         exponent = int(text.lower().partition("e")[2] or 0)
@@ -230,7 +230,7 @@ class _Numbers:
         """Three numbers."""
         return vector(self.some(text, what, 3, default), what)
 
-    def one(self, text: str | None, what: str, default: str | None = None) -> Fraction:
+    def number(self, text: str | None, what: str, default: str | None = None) -> Fraction:
         """One number."""
         return self.some(text, what, 1, default)[0]
 
@@ -260,7 +260,7 @@ class _Numbers:
 
     def require_parts(self, element: Element, known: Sequence[str]) -> None:
         """Raises InputError for an element within another that is not of the format, or that occurs twice."""
-        self.require_known([part.tag for part in element], element, known, "element")
+        self.require_known([child.tag for child in element], element, known, "element")
         self.require_once(element, *known)
 
     def require_once(self, element: Element, *tags: str) -> None:
@@ -330,12 +330,12 @@ def _urdf(name: str, link: Element, inertial: Element, around: _Around) -> BodyI
     numbers.require_parts(inertial, ("origin", "mass", "inertia"))
     tensor = numbers.attributes(inertial.find("inertia"), *_SIX_URDF)
     six, slack = numbers.tensor([tensor.get(key) for key in _SIX_URDF], _SIX_URDF)
-    value = numbers.one(numbers.attributes(inertial.find("mass"), "value").get("value"), "mass")
+    value = numbers.number(numbers.attributes(inertial.find("mass"), "value").get("value"), "mass")
     axes, centre = _origin(numbers, inertial)
     shape = _shape_of(_shapes(numbers, link, partial(_origin, numbers)), centre)
-    of_gazebo = [part for part, outer in around.items() if outer.tag == "gazebo" and outer.get("reference") == name]
-    switches = [part for part in of_gazebo if part.tag in ("gravity", "turnGravityOff")]
-    falls = all(numbers.flag(part.text, part.tag) == (part.tag == "gravity") for part in switches)
+    of_gazebo = [child for child, outer in around.items() if outer.tag == "gazebo" and outer.get("reference") == name]
+    switches = [child for child in of_gazebo if child.tag in ("gravity", "turnGravityOff")]
+    falls = all(numbers.flag(child.text, child.tag) == (child.tag == "gravity") for child in switches)
     return BodyInFile(name, value, centre, _in_axes(axes, six), slack, *shape, gravity=EARTH if falls else _ZERO)
 
 
@@ -371,12 +371,12 @@ _SIZES = {"box": 3, "cylinder": 2, "sphere": 1}
 
 def _uniform(kind: str, sizes: Sequence[Fraction]) -> Vector:
     """Principal moments of a shape of unit mass."""
-    first, *more = (size * size for size in sizes)
+    first, *others = (size * size for size in sizes)
     if kind == "sphere":
         return (2 * first / 5,) * 3
     if kind == "box":
-        return (more[0] + more[1]) / 12, (first + more[1]) / 12, (first + more[0]) / 12
-    return (3 * first + more[0]) / 12, (3 * first + more[0]) / 12, first / 2
+        return (others[0] + others[1]) / 12, (first + others[1]) / 12, (first + others[0]) / 12
+    return (3 * first + others[0]) / 12, (3 * first + others[0]) / 12, first / 2
 
 
 def _primitive(numbers: _Numbers, geometry: Element) -> Vector | None:
@@ -385,7 +385,7 @@ def _primitive(numbers: _Numbers, geometry: Element) -> Vector | None:
         if (shape := geometry.find(kind)) is not None:
             size, *lengths = ((shape.get(key, shape.findtext(key)), key) for key in ("size", "radius", "length"))
             return _uniform(
-                kind, numbers.three(*size) if kind == "box" else [numbers.one(*length) for length in lengths[:count]]
+                kind, numbers.three(*size) if kind == "box" else [numbers.number(*length) for length in lengths[:count]]
             )
     return None
 
@@ -393,12 +393,12 @@ def _primitive(numbers: _Numbers, geometry: Element) -> Vector | None:
 def _shapes(numbers: _Numbers, link: Element, pose: Callable[[Element], Pose]) -> list[Shape]:
     """Its collision shapes, or where there are none its visual ones; [] where a mesh is among them."""
     shapes: list[Shape] = []
-    for part in link.findall("collision") or link.findall("visual"):
-        geometry = part.find("geometry")
+    for shape in link.findall("collision") or link.findall("visual"):
+        geometry = shape.find("geometry")
         moments = None if geometry is None else _primitive(numbers, geometry)
         if moments is None:
             return []
-        shapes.append((*pose(part), moments))
+        shapes.append((*pose(shape), moments))
     return shapes
 
 
@@ -423,7 +423,7 @@ def _sdf(name: str, link: Element, inertial: Element, around: _Around) -> BodyIn
         numbers.require_parts(tensor, _SIX_URDF)
     texts = [None if tensor is None else tensor.findtext(key) for key in _SIX_URDF]
     six, slack = numbers.tensor(texts, _SIX_URDF, products="0")
-    mass, frames = numbers.one(inertial.findtext("mass"), "mass"), _SdfFrames(numbers, link, around)
+    mass, frames = numbers.number(inertial.findtext("mass"), "mass"), _SdfFrames(numbers, link, around)
     shape = _shape_of(_shapes(numbers, link, frames.in_link), centre)
     return BodyInFile(name, mass, centre, _in_axes(axes, six), slack, *shape, frames.ball(), frames.gravity())
 
@@ -439,7 +439,7 @@ class _SdfFrames:
     def named(self, name: str) -> Element:
         """The frame of this name."""
         model = self.around[self.link]
-        frames = [part for part in model if part.tag in ("link", "joint", "frame") and part.get("name") == name]
+        frames = [frame for frame in model if frame.tag in ("link", "joint", "frame") and frame.get("name") == name]
         if not frames and name != "__model__":
             raise InputError(f"{self.numbers.where}: its model has no frame {quoted(name)}.", "Use one model.")
         return frames[0] if frames else model
@@ -468,7 +468,7 @@ class _SdfFrames:
     def ball(self) -> Vector | None:
         """The place of the ball joint whose child is the link, or a frame attached to it; None without one."""
         places, model = [], self.around[self.link]
-        for joint in [part for part in self.around if (part.tag, part.get("type")) == ("joint", "ball")]:
+        for joint in [frame for frame in self.around if (frame.tag, frame.get("type")) == ("joint", "ball")]:
             child = _base(joint)
             if child.endswith(f"::{self.link.get('name')}"):
                 raise InputError(
@@ -546,7 +546,7 @@ def _mjcf(path: Path, root: Element) -> Iterator[Link]:
     frames = _MjcfFrames(root, _around(root), settings, _gravity(root))
     for index, body in enumerate(root.iter("body")):
         name, parts = body.get("name") or f"body{index + 1}", [*_parts(body)]
-        tags = [part.tag for part, _ in parts]
+        tags = [child.tag for child, _ in parts]
         if "inertial" in tags:
             yield name, partial(_mjcf_body, name, body, parts, frames)
         elif "geom" in tags:
@@ -575,22 +575,22 @@ _Parts = Sequence[tuple["Element", Sequence["Element"]]]
 
 def _parts(element: Element, frames: tuple[Element, ...] = ()) -> Iterator[tuple[Element, tuple[Element, ...]]]:
     """The elements of a body of MJCF, each with the frames around it in the body, the outermost first."""
-    for part in element:
-        yield part, frames
-        if part.tag == "frame":
-            yield from _parts(part, (*frames, part))
+    for child in element:
+        yield child, frames
+        if child.tag == "frame":
+            yield from _parts(child, (*frames, child))
 
 
 def _mjcf_body(name: str, body: Element, parts: _Parts, frames: _MjcfFrames) -> BodyInFile:
     numbers = _Numbers(f"body {name}")
-    (inertial, around), *more = (pair for pair in parts if pair[0].tag == "inertial")
-    if more:
-        raise InputError(f"{numbers.where}: {len(more) + 1} inertials were given.", "Leave one.")
+    (inertial, around), *repeated = (pair for pair in parts if pair[0].tag == "inertial")
+    if repeated:
+        raise InputError(f"{numbers.where}: {len(repeated) + 1} inertials were given.", "Leave one.")
     numbers.attributes(inertial, "pos", "mass", "diaginertia", "fullinertia", *_ORIENTATIONS)
     numbers.three(inertial.get("pos"), "pos")
     six, slack = numbers.tensor(_mjcf_six(numbers, inertial), ("M11", "M22", "M33", "M12", "M13", "M23"))
-    least_mass, least = (numbers.one(frames.settings.get(key), key, "0") for key in ("boundmass", "boundinertia"))
-    mass = max(numbers.one(inertial.get("mass"), "mass"), least_mass)
+    least_mass, least = (numbers.number(frames.settings.get(key), key, "0") for key in ("boundmass", "boundinertia"))
+    mass = max(numbers.number(inertial.get("mass"), "mass"), least_mass)
     if least and inertia_slips.has_second_moments(rows(six), slack):
         spare = inertia_slips.minus(rows(six), rows((least, least, least, *_ZERO)))
         if any(six[3:]) and not inertia_slips.is_positive(spare):
@@ -603,11 +603,11 @@ def _mjcf_body(name: str, body: Element, parts: _Parts, frames: _MjcfFrames) -> 
         six = (mean, mean, mean, *_ZERO)
     axes, centre = frames.pose(numbers, inertial, around)
     balls = [pair for pair in parts if frames.attributes(pair[0]).get("type") == "ball"]
-    if any(numbers.one(frames.attributes(ball).get("armature"), "armature", "0") for ball, _ in balls):
+    if any(numbers.number(frames.attributes(ball).get("armature"), "armature", "0") for ball, _ in balls):
         raise InputError(f"{numbers.where}: the armature of its ball joint moves with no rigid body.", "Set it to 0.")
     joint = frames.pose(numbers, *balls[0])[1] if balls else None
     shape = _shape_of(frames.shapes(numbers, parts), centre)
-    x, y, z = ((1 - numbers.one(body.get("gravcomp"), "gravcomp", "0")) * value for value in frames.gravity)
+    x, y, z = ((1 - numbers.number(body.get("gravcomp"), "gravcomp", "0")) * value for value in frames.gravity)
     return BodyInFile(name, mass, centre, _in_axes(axes, six), slack, *shape, joint, (x, y, z))
 
 
@@ -701,12 +701,12 @@ class _MjcfFrames:
         while name is None and outer in self.around:
             outer = self.around[outer]
             name = outer.get("childclass")
-        classes = [part for part in self.root.iter("default") if name and part.get("class") == name]
+        classes = [default for default in self.root.iter("default") if name and default.get("class") == name]
         while classes and classes[-1].tag == "default":
             classes.append(self.around[classes[-1]])
         for default in (*classes, *reversed(self.root.findall("default"))):
-            part = default.find(element.tag) if default.tag == "default" else None
-            values = values if part is None else {**part.attrib, **values}
+            template = default.find(element.tag) if default.tag == "default" else None
+            values = values if template is None else {**template.attrib, **values}
         return values
 
     def pose(self, numbers: _Numbers, element: Element, around: Sequence[Element]) -> Pose:
@@ -754,8 +754,8 @@ class _MjcfFrames:
             size, kind = numbers.read(values.get("size"), "size", ""), values.get("type", "sphere")
             if len(size) != _SIZES.get(kind):
                 return []
-            first, *more = size  # half the edges of a box, and half the length of a cylinder
-            sizes = [2 * first if kind == "box" else first, *(2 * value for value in more)]
+            first, *others = size  # half the edges of a box, and half the length of a cylinder
+            sizes = [2 * first if kind == "box" else first, *(2 * value for value in others)]
             shapes.append((*self.pose(numbers, geom, around), _uniform(kind, sizes)))
         return shapes
 
@@ -831,7 +831,7 @@ def _of_prims(prims: Sequence[tuple[str, Mapping[str, str]]], units: Mapping[str
 
 def _prim(name: str, values: Mapping[str, str], units: Mapping[str, str]) -> BodyInFile:
     numbers = _Numbers(f"prim {name}")
-    length, kilogram = (numbers.one(units[key], key) for key in ("metersPerUnit", "kilogramsPerUnit"))
+    length, kilogram = (numbers.number(units[key], key) for key in ("metersPerUnit", "kilogramsPerUnit"))
     parts = [*values["diagonalInertia"].replace(",", " ").split(), "0", "0", "0"]
     diagonal = numbers.some(values["diagonalInertia"], "diagonalInertia", 3)
     if "inf" in values.get("centerOfMass", "") or not any(diagonal):
@@ -846,14 +846,14 @@ def _prim(name: str, values: Mapping[str, str], units: Mapping[str, str]) -> Bod
     scale = kilogram * length**2
     a, b, c, d, e, f = (value * scale for value in _in_axes(turn, six))
     x, y, z = (value * length for value in numbers.three(values.get("centerOfMass"), "centerOfMass", "0 0 0"))
-    mass = numbers.one(values["mass"], "mass") * kilogram
+    mass = numbers.number(values["mass"], "mass") * kilogram
     free = values.get("disableGravity", "0").lower() in ("1", "1.0", "true")
     magnitude = values.get("gravityMagnitude", "-inf")  # as on Earth
-    size = -EARTH[2] if magnitude.startswith("-") else numbers.one(magnitude, "gravityMagnitude") * length
+    size = -EARTH[2] if magnitude.startswith("-") else numbers.number(magnitude, "gravityMagnitude") * length
     down = numbers.three(values.get("gravityDirection"), "gravityDirection", "0 0 0")
     if not any(down):
         down = vector([-int(axis == units["upAxis"]) for axis in "XYZ"], "upAxis")
-    gx, gy, gz = ((0 if free else size) * part for part in _unit(down))
+    gx, gy, gz = ((0 if free else size) * component for component in _unit(down))
     return BodyInFile(name, mass, (x, y, z), (a, b, c, d, e, f), slack * scale, gravity=(gx, gy, gz))
 
 
@@ -875,7 +875,7 @@ def composed_usd(path: Path) -> Iterator[Link]:
         stage = Usd.Stage.Open(str(path))
         faults = [str(fault).rstrip(".") for fault in stage.GetCompositionErrors()]
     except Tf.ErrorException as error:
-        faults = [part.commentary for part in error.args]
+        faults = [fault.commentary for fault in error.args]
     if faults:
         raise InputError(f"USD refuses {path}: {'; '.join(faults)[:200]}.", "Correct the file or its layers.")
     units = {
@@ -888,7 +888,7 @@ def composed_usd(path: Path) -> Iterator[Link]:
     for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
         attributes = {name: prim.GetAttribute(f"physics:{name}") for name in _USD_NAMES[:-1]}
         attributes["disableGravity"] = prim.GetAttribute("physxRigidBody:disableGravity")
-        first = {name: part.Get(Usd.TimeCode.EarliestTime()) for name, part in attributes.items()}
+        first = {name: attribute.Get(Usd.TimeCode.EarliestTime()) for name, attribute in attributes.items()}
         values = {name: _printed(value) for name, value in first.items() if attributes[name].HasAuthoredValue()}
         prims.append((prim.GetName(), values))
     return _of_prims(prims, units)
@@ -899,7 +899,7 @@ def _printed(value: Any) -> str:
     import numpy
 
     parts = [value.real, *value.imaginary] if hasattr(value, "imaginary") else numpy.ravel(value)
-    return ", ".join(str(numpy.float32(part)) for part in parts)
+    return ", ".join(str(numpy.float32(number)) for number in parts)
 
 
 def _toml(path: Path, text: str) -> Iterator[Link]:
@@ -935,7 +935,7 @@ def _toml_table(name: str, table: Mapping[str, Any]) -> BodyInFile:
         raise InputError(f"{numbers.where}: inertia must have 3, 6 or 9 numbers; got {len(texts)}.", "Give 3, 6 or 9.")
     six, slack = numbers.tensor(texts, ("I11", "I22", "I33", "I12", "I13", "I23"))
     centre = numbers.three(" ".join(_texts(table.get("centre", ["0", "0", "0"]))), "centre")
-    mass = numbers.one(str(table["mass"]), "mass")
+    mass = numbers.number(str(table["mass"]), "mass")
     if table.get("about") not in ("pivot", "centre of mass") and (any(centre) or "about" in table):
         raise InputError(
             f"{numbers.where}: the reference point of the inertia tensor (about) is missing.",
@@ -943,7 +943,7 @@ def _toml_table(name: str, table: Mapping[str, Any]) -> BodyInFile:
         )
     if table.get("rotor"):
         raise InputError(f"{numbers.where}: a rotor in a file is not supported.", "Describe the whole body.")
-    gravity = (Fraction(0), Fraction(0), -numbers.one(str(table.get("gravity", "9.81")), "gravity"))
+    gravity = (Fraction(0), Fraction(0), -numbers.number(str(table.get("gravity", "9.81")), "gravity"))
     return BodyInFile(name, mass, centre, six, slack, gravity=gravity, at_pivot=table.get("about") == "pivot", si=False)
 
 

@@ -113,7 +113,7 @@ def faulty(fault: str) -> Trajectory:
     seen = of_states(GENERIC.top, GENERIC.start, times, [[Fraction(1)] * 9], xi)
     course = simulate(
         FAULTS.get(fault, lambda data: data)(seen.body),
-        seen.start.begin(seen.said, seen.body.tensor),
+        seen.start.begin(seen.declared, seen.body.tensor),
         tuple(map(float, times)),
     )
     rotation = course.rotation.transpose(0, 2, 1) if fault == "conjugate" else course.rotation

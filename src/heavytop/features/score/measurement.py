@@ -128,7 +128,7 @@ def _frame(observed: Observed) -> FileAxes:
 
 def _in_axes_of_file(samples: Observations) -> list[tuple[Any, ...]]:
     """Ω, γ and, of an attitude, ξ of each sample in the axes of the file; None for what it does not give."""
-    unknown, reading, columns = numpy.full((len(samples.times), 3), numpy.nan), samples.said, samples.columns
+    unknown, reading, columns = numpy.full((len(samples.times), 3), numpy.nan), samples.declared, samples.columns
     form = next((form for form in FORMS if form in columns), None)
     omega, gamma = (columns.get(name, unknown) for name in ("omega", "gamma"))
     parts = [omega, gamma]

@@ -128,30 +128,30 @@ def is_convention(fit: Diagnosis) -> bool:
 
 def sentence(fit: Diagnosis) -> str:
     """The mistake with its numbers, how far the error falls, and the digits that are right with it."""
-    said = _mistake(fit)
+    mistake = _mistake(fit)
     if fit.error is None or fit.left is None:
-        return f"{said}."
+        return f"{mistake}."
     if fit.numbers.get("of") == "rates":
-        return f"{said}: the relative difference is {fit.left:.2e} if so, and {fit.error:.2e} if not."
+        return f"{mistake}: the relative difference is {fit.left:.2e} if so, and {fit.error:.2e} if not."
     digits = -math.log10(max(fit.left, FLOOR))
     more = " or more" if fit.left < FLOOR else ""
     left = f"less than {FLOOR:.0e}" if more else f"{fit.left:.2e}"
     fall = f"the largest error relative to the size of each quantity falls from {fit.error:.2e} to {left}"
-    text = f"{said}. With this corrected, {fall}, and {digits:.1f} digits{more} are right."
+    text = f"{mistake}. With this corrected, {fall}, and {digits:.1f} digits{more} are right."
     return text + (f" Equally good: {'. Or: '.join(map(_mistake, fit.others))}." if fit.others else "")
 
 
 def _mistake(fit: Diagnosis) -> str:
     numbers = fit.numbers
-    said = "; ".join(_CONVENTION_SENTENCES[kind].format(**numbers) for kind in fit.kind.split("+"))
-    said += f" ({numbers['entries']} only)" if "entries" in numbers else ""
-    said += f" ({numbers['steps']})" if "steps" in numbers else ""
+    mistake = "; ".join(_CONVENTION_SENTENCES[kind].format(**numbers) for kind in fit.kind.split("+"))
+    mistake += f" ({numbers['entries']} only)" if "entries" in numbers else ""
+    mistake += f" ({numbers['steps']})" if "steps" in numbers else ""
     where = {
         "columns": ", in the columns only",
         "start": ", in the start only",
         "rates": ". Ω was compared with the rate of the attitude, without a reference",
     }
-    return said + where.get(numbers.get("of", ""), "")
+    return mistake + where.get(numbers.get("of", ""), "")
 
 
 # Sentences of the other diagnoses.
@@ -222,7 +222,7 @@ _WHOSE = {"omega": "Ω is", "both": "Ω and γ are"}
 
 def cause(fit: Diagnosis, system: str) -> str:
     """The mistake in words, without the fall of the error."""
-    return _mistake(fit) if is_convention(fit) else _said(fit, system)
+    return _mistake(fit) if is_convention(fit) else _other_mistake(fit, system)
 
 
 def diagnosis_text(fit: Diagnosis, system: str = "heavy_top") -> str:
@@ -230,14 +230,14 @@ def diagnosis_text(fit: Diagnosis, system: str = "heavy_top") -> str:
     likely = "Likely: " if fit.likely else ""
     if is_convention(fit):
         return _scope(fit) + likely + sentence(fit)
-    said = _scope(fit) + likely + _said(fit, system)
+    mistake = _scope(fit) + likely + _other_mistake(fit, system)
     if fit.left is None or fit.error is None:
-        return said
+        return mistake
     if fit.kind in ("one_state", "some_states"):
         without = "it" if fit.kind == "one_state" else "them"
-        return f"{said}; without {without} the largest error relative to the size of Ω and γ is {_size(fit.left)}."
+        return f"{mistake}; without {without} the largest error relative to the size of Ω and γ is {_size(fit.left)}."
     fall = f"the largest error relative to the size of Ω and γ falls from {_size(fit.error)} to {_size(fit.left)}"
-    return f"{said}; {fall}."
+    return f"{mistake}; {fall}."
 
 
 def _scope(fit: Diagnosis) -> str:
@@ -252,7 +252,7 @@ def _size(value: float) -> str:
     return short(f"{value:.2e}", 2) if value >= FLOOR else f"less than {FLOOR:.0e}"
 
 
-def _said(fit: Diagnosis, system: str) -> str:
+def _other_mistake(fit: Diagnosis, system: str) -> str:
     numbers = fit.numbers
     if fit.kind in _MEANINGS:
         return f"In these states {_MEANINGS[fit.kind]}"
@@ -261,7 +261,7 @@ def _said(fit: Diagnosis, system: str) -> str:
     kind = "column_negated" if (fit.kind, numbers.get("factor")) == ("column_scaled", "-1") else fit.kind
     if (text := _SENTENCES.get(numbers.get("to", kind))) is None:
         return _integrals_off(numbers)
-    more = {
+    derived = {
         "columns_said": _columns(numbers),
         "order": f"axes {', '.join(numbers.get('axes', ''))} as 1, 2, 3",
         "named": ", ".join(f"{name} = {value}" for name, value in numbers.items()),
@@ -272,7 +272,7 @@ def _said(fit: Diagnosis, system: str) -> str:
         "whose": _WHOSE.get(numbers.get("of", ""), ""),
         "still": _still(**numbers) if fit.kind == "frozen" else "",
     }
-    return text.format(**numbers | more)
+    return text.format(**numbers | derived)
 
 
 def _still(states: str, vector: str = "", **_: str) -> str:
@@ -311,13 +311,13 @@ def _columns(numbers: dict[str, str]) -> str:
 def _integrals_off(numbers: dict[str, str]) -> str:
     """The behaviour of each first integral, those first that keep another value."""
     off = [f"{name} ({value})" for name, value in numbers.items() if value not in (VARIES, AS_AT_START)]
-    said = [f"from the first sample on {_listed(off)} {_keep(off)} another value than at the start"]
+    parts = [f"from the first sample on {_listed(off)} {_keep(off)} another value than at the start"]
     for text, verb in ((AS_AT_START, "{} the value of the start"), (VARIES, "")):
         names = [name for name, value in numbers.items() if value == text]
         if names:
             does = verb.format(_keep(names)) if verb else "vary" if len(names) > 1 else "varies"
-            said.append(f"{_listed(names)} {does}")
-    return f"Of the first integrals, {'; '.join(said)}. Nothing that was tried explains it."
+            parts.append(f"{_listed(names)} {does}")
+    return f"Of the first integrals, {'; '.join(parts)}. Nothing that was tried explains it."
 
 
 def _listed(names: list[str]) -> str:
@@ -355,10 +355,10 @@ def answer(row: Row, peer: Peer | None) -> list[str]:
             unknown if row.samples else "The number of digits right is unknown: the first state is not finite.",
         ]
     where = "every sample up to" if row.samples > 1 else "its one sample,"
-    said = f"{digits_text(digits)} of {digits_of(row.bits)} digits right at {where} T = {short(row.time_reached)}"
+    text = f"{digits_text(digits)} of {digits_of(row.bits)} digits right at {where} T = {short(row.time_reached)}"
     if peer is not None:
-        said += f"; {peer.integrator} in {peer.precision}: {digits_text(peer.digits_right)}"
-    lines.append(f"{said}.")
+        text += f"; {peer.integrator} in {peer.precision}: {digits_text(peer.digits_right)}"
+    lines.append(f"{text}.")
     mostly = direction(row)
     if mostly is not None:
         lines.append(_DIRECTIONS[mostly])
@@ -367,17 +367,18 @@ def answer(row: Row, peer: Peer | None) -> list[str]:
 
 def requirement(row: Row, needed: Fraction, cut: str = "") -> str:
     """Whether as many digits are right as are required, in a sentence; ``cut`` as in :func:`passed`."""
-    asked = f"{float(needed):g} digits required"
+    required = f"{float(needed):g} digits required"
     kept, good = digits_right(row), passed(row, needed, cut)
     # rounded down, so that what is not enough does not look so
     shown = "" if kept is None else f"{math.floor(kept * 1000) / 1000:g}"
     if good is not None:
-        return f"{asked}: " + ("satisfied." if good else f"only {shown} are right.")
+        return f"{required}: " + ("satisfied." if good else f"only {shown} are right.")
     if row.outcome != "success":
-        return f"{asked}: unknown, because the run ended early."
+        return f"{required}: unknown, because the run ended early."
     if cut:
-        return f"{asked}: unknown, because {cut}, and later rows are not scored."
-    return f"{asked}: unknown, because " + ("there is no reference." if kept is None else f"only {shown} are resolved.")
+        return f"{required}: unknown, because {cut}, and later rows are not scored."
+    reason = "there is no reference" if kept is None else f"only {shown} are resolved"
+    return f"{required}: unknown, because {reason}."
 
 
 def guessed(assessment: Assessment) -> str | None:
@@ -385,36 +386,36 @@ def guessed(assessment: Assessment) -> str | None:
     if not assessment.format_guessed:
         return None
     name = assessment.row.precision
-    said = f"The format is not declared; {name} is the narrowest, from double on, that holds the digits written."
+    text = f"The format is not declared; {name} is the narrowest, from double on, that holds the digits written."
     single = " All numbers of the states are in single precision (24 bits), in which they may have been computed."
-    return said + (single if assessment.single else "")
+    return text + (single if assessment.single else "")
 
 
-def told(assessment: Assessment) -> list[str]:
+def explanations(assessment: Assessment) -> list[str]:
     """Explanations of the error, and what was guessed."""
-    said = [diagnosis_text(fit, assessment.row.system) for fit in assessment.diagnoses]
+    sentences = [diagnosis_text(fit, assessment.row.system) for fit in assessment.diagnoses]
     note = guessed(assessment)
-    return [*([assessment.used] if assessment.used else []), *said, *([note] if note else [])]
+    return [*([assessment.used] if assessment.used else []), *sentences, *([note] if note else [])]
 
 
 def to_json(assessment: Assessment) -> dict[str, Any]:
     """The document of `score --json`: the row, the digits, the peer and the diagnosis."""
     peer = None if assessment.peer is None else asdict(assessment.peer)
-    said = [asdict(fit) | {"sentence": diagnosis_text(fit, assessment.row.system)} for fit in assessment.diagnoses]
+    diagnoses = [asdict(fit) | {"sentence": diagnosis_text(fit, assessment.row.system)} for fit in assessment.diagnoses]
     answers = {
         "digits_kept": assessment.digits_right,
         "digits_right": assessment.digits_right,
         "of_digits": assessment.of_digits,
     }
-    more: dict[str, Any] = {"scored": assessment.used} if assessment.used else {}
-    more |= {
+    further: dict[str, Any] = {"scored": assessment.used} if assessment.used else {}
+    further |= {
         "peer": peer,
         "mostly": assessment.direction,
         "format_guessed": assessment.format_guessed,
-        "diagnosis": said,
+        "diagnosis": diagnoses,
     }
     row: dict[str, Any] = msgspec.to_builtins(assessment.row)
-    return row | answers | more
+    return row | answers | further
 
 
 def sizes(row: Row) -> list[list[Cell]]:
@@ -445,9 +446,9 @@ def score_text(assessment: Assessment) -> RenderableType:
     about = f"{row.case}: {row.integrator}, {row.system.replace('_', ' ')} in {row.precision} ({row.bits} bits)"
     parts: list[RenderableType] = [Text(line) for line in answer(row, assessment.peer)]
     parts += [Text(), *(table if lines else []), *_wrapped(about), *_wrapped(f"Reference: {row.reference.brief}.")]
-    explained = told(assessment)
-    if explained:
-        parts += [Text(), *(line for text in explained for line in _wrapped(text))]
+    sentences = explanations(assessment)
+    if sentences:
+        parts += [Text(), *(line for text in sentences for line in _wrapped(text))]
     return Group(*parts)
 
 
@@ -471,7 +472,7 @@ _CURVES = {
 
 def score_report(assessment: Assessment, environment: dict[str, Any], sha256: str = "") -> Report:
     """A report of this row alone, which `compare` reads, with the remarks of its page."""
-    beside = Beside(assessment.peer, tuple(told(assessment)))
+    beside = Beside(assessment.peer, tuple(explanations(assessment)))
     return Report(SCHEMA, {"name": "score", "sha256": sha256}, environment, [assessment.row], beside)
 
 
@@ -480,9 +481,9 @@ def one_motion(row: Row, beside: Beside) -> Iterator[Block]:
     first, *others = answer(row, beside.peer)
     yield Headline(first)
     compared = f"Reference: {row.reference.brief}."
-    yield from (Note(said, shown=In.FULL | In.PAGE) for said in (*others, *([] if beside.remarks else [compared])))
+    yield from (Note(text, shown=In.FULL | In.PAGE) for text in (*others, *([] if beside.remarks else [compared])))
     if beside.remarks:
-        remarks = [Note(said) for said in beside.remarks[:_MOST]]
+        remarks = [Note(text) for text in beside.remarks[:_MOST]]
         yield Card("Remarks", remarks, note=compared, shown=In.FULL | In.PAGE)
     yield Chart(digits_over_time)
     units = (

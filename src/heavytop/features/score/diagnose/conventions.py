@@ -93,7 +93,7 @@ class ConventionSearch(Search):
     names_others = True
 
     def __init__(self, samples: Observations, step: Fraction | None = None) -> None:
-        self.step, self.start = step, samples.start.begin(samples.said, samples.body.tensor)
+        self.step, self.start = step, samples.start.begin(samples.declared, samples.body.tensor)
         rate = turning(samples.body, self.start)
         times = list(map(float, samples.times))
         rows = chosen_rows(times, rate)
@@ -138,7 +138,7 @@ class ConventionSearch(Search):
     def of_rates(self) -> Diagnosis | None:
         """The simplest reading of the columns in which Ω is the rate of the attitude; no motion is computed."""
         samples = self.every.at(list(range(min(_NEIGHBOURS, len(self.every.times)))))
-        off = rates_off(samples, samples.said)
+        off = rates_off(samples, samples.declared)
         if off is None or not _CONTRADICTS < (error := float(off.max())) < numpy.inf:
             return None
         readings = [(name, numbers, rates_off(samples, reading)) for name, numbers, reading in _readings(samples)]
@@ -154,9 +154,9 @@ class ConventionSearch(Search):
     def refused(self) -> float:
         """The error of the first samples beyond which a motion explains nothing."""
         rates = [
-            [v for name, v in part.columns.items() if name.startswith("omega")] for part in (self.early, self.samples)
+            [v for k, v in samples.columns.items() if k.startswith("omega")] for samples in (self.early, self.samples)
         ]
-        early, largest = (max((float(numpy.abs(values).max()) for values in part), default=1.0) for part in rates)
+        early, largest = (max((float(numpy.abs(values).max()) for values in samples), default=1.0) for samples in rates)
         return refused(early, largest, float(self.file_errors.max()))
 
     def _tried(self, row: Row) -> Hypothesis:
@@ -182,7 +182,7 @@ class ConventionSearch(Search):
     ) -> SimulatedMotion | None:
         """The motion of the file with another reading of its start, another body, other times, another start."""
         body = body or samples.body
-        begin = begin or samples.start.begin(start or samples.said, body.tensor)
+        begin = begin or samples.start.begin(start or samples.declared, body.tensor)
         return simulate(body, begin, tuple(float(unit * time + shift) for time in samples.times))
 
     def errors_if(self, samples: Observations, **supposed: Any) -> Array:
@@ -223,7 +223,7 @@ class ConventionSearch(Search):
         if mixed is not None:
             name, matrix = mixed
             samples = replace(samples, columns={**samples.columns, name: samples.columns[name] @ matrix})
-        return residuals(samples, simulated, columns or samples.said, body or samples.body)
+        return residuals(samples, simulated, columns or samples.declared, body or samples.body)
 
 
 def _hypotheses(search: ConventionSearch) -> Iterator[Row]:
@@ -235,8 +235,8 @@ def _hypotheses(search: ConventionSearch) -> Iterator[Row]:
     for kind, numbers, body in _bodies(samples):
         yield kind, numbers, {"body": body}
         if kind == "gravity_sign":
-            for other, more, reading in _axes_of_space(samples):
-                yield from _scopes(samples, other, more, reading)
+            for other_kind, other_numbers, reading in _axes_of_space(samples):
+                yield from _scopes(samples, other_kind, other_numbers, reading)
     yield from _steps(search)
     yield from _positions(samples)
     yield from _renamed(samples)
@@ -258,11 +258,11 @@ def _steps(search: ConventionSearch) -> Iterator[Row]:
         turns = turning(search.samples.body, search.start) * abs(float(search.samples.times[-1]))
         for factor in sorted(factor for factor in TIME_UNITS if factor * turns <= FARTHEST):
             yield "time_unit", {"factor": f"{float(factor):.6g}"}, {"unit": factor}
-    for part, sign in product((Fraction(1, 2), Fraction(1)), (-1, 1)) if search.step else ():
-        shift = sign * part * (search.step or 0)
+    for fraction, sign in product((Fraction(1, 2), Fraction(1)), (-1, 1)) if search.step else ():
+        shift = sign * fraction * (search.step or 0)
         yield "times_shifted", {"shift": _signed(shift)}, {"shift": shift}
         if has_more:
-            text = f"{'half a step' if part < 1 else 'one step'} {'early' if sign < 0 else 'late'}"
+            text = f"{'half a step' if fraction < 1 else 'one step'} {'early' if sign < 0 else 'late'}"
             yield "omega_shifted", {"shift": _signed(shift), "steps": text}, {"shift": shift, "rates": True}
 
 
@@ -285,16 +285,16 @@ def _columns(samples: Observations) -> Iterator[Row]:
     for quantity, names in _WORDS.items():
         if quantity not in samples.columns:
             continue
-        if quantity == "quaternion" and samples.said.quaternion_order == "xyzw":
+        if quantity == "quaternion" and samples.declared.quaternion_order == "xyzw":
             names = *names[1:], names[0]
         unit = numpy.eye(len(names))
-        for place, name in enumerate(names):
+        for index, name in enumerate(names):
             for factor, value in _UNITS.items():
                 if value < 0 or quantity in ("euler", "omega", "omega_space"):
-                    matrix = unit / numpy.where(numpy.arange(len(names)) == place, value, 1.0)
+                    matrix = unit / numpy.where(numpy.arange(len(names)) == index, value, 1.0)
                     yield "column_scaled", {"column": name, "factor": factor}, {"mixed": (quantity, matrix)}
         for i, j in combinations(range(len(names)), 2):
-            order = [{i: j, j: i}.get(place, place) for place in range(len(names))]
+            order = [{i: j, j: i}.get(index, index) for index in range(len(names))]
             numbers = {"columns": f"{names[i]} and {names[j]}"}
             yield "column_order", numbers, {"mixed": (quantity, unit[:, order])}
 
@@ -302,10 +302,10 @@ def _columns(samples: Observations) -> Iterator[Row]:
 def _data(search: ConventionSearch) -> Iterator[Row]:
     """Another value of one number of the body."""
     samples = search.samples
-    for kind, numbers, key, part in _scalable(samples.body) if len(samples.times) >= _FEWEST else ():
+    for kind, numbers, key, direction in _scalable(samples.body) if len(samples.times) >= _FEWEST else ():
 
-        def body_of(x: Array, key: str = key, part: Any = part) -> dict[str, Any]:
-            scaled: dict[str, Any] = {key: getattr(samples.body, key) * (1.0 + part * x[0])}
+        def body_of(x: Array, key: str = key, direction: Any = direction) -> dict[str, Any]:
+            scaled: dict[str, Any] = {key: getattr(samples.body, key) * (1.0 + direction * x[0])}
             return {"body": replace(samples.body, **scaled)}
 
         x, left = _refined(search, body_of, 1, DROP)
@@ -401,9 +401,10 @@ def _signed(shift: Fraction) -> str:
 def _scopes(samples: Observations, kind: str, numbers: dict[str, str], reading: Reading) -> Iterator[Row]:
     """The reading of start and columns, of the columns, and of the start, as far as each differs from the file's."""
     inertia = samples.body.tensor
-    before, after = (samples.start.begin(columns, inertia) for columns in (samples.said, reading))
+    before, after = (samples.start.begin(columns, inertia) for columns in (samples.declared, reading))
     moved = not (numpy.array_equal(before.rotation, after.rotation) and numpy.array_equal(before.omega, after.omega))
-    of_omega = replace(samples.said, swapped=reading.swapped, omega=reading.omega, momentum=reading.momentum) == reading
+    omega = {name: getattr(reading, name) for name in ("swapped", "omega", "momentum")}
+    of_omega = replace(samples.declared, **omega) == reading
     read = not of_omega or any(name.startswith("omega") for name in samples.columns)
     if moved and read:
         yield kind, {**numbers, "of": BOTH}, {"columns": reading, "start": reading}
@@ -425,22 +426,22 @@ Named = tuple[str, dict[str, str], Reading]
 
 def _readings(samples: Observations) -> Iterator[Named]:
     """Readings without a fitted number, the likeliest first."""
-    said, forms = samples.said, _forms(samples)
+    declared, forms = samples.declared, _forms(samples)
     words = {"quaternion_order": ORDERS, "quaternion": DIRECTIONS, "matrix": DIRECTIONS, "angles": ANGLES}
     order, conjugate, transposed, unit = (
-        {key: next(word for word in pair if word != getattr(said, key))} for key, pair in words.items()
+        {key: next(word for word in pair if word != getattr(declared, key))} for key, pair in words.items()
     )
     frame = "body" if "omega_space" in forms else "space"
-    sequences = [{"sequence": sequence} for sequence in SEQUENCES if sequence != said.sequence]
+    sequences = [{"sequence": sequence} for sequence in SEQUENCES if sequence != declared.sequence]
     rows: list[tuple[str, str, dict[str, str], dict[str, Any]]] = [
         ("quaternion", "scalar_last", order, order),
         ("quaternion", "conjugate", conjugate, conjugate),
         ("matrix", "transposed", transposed, transposed),
         ("euler", "degrees", {"unit": unit["angles"]}, unit),
-        ("euler", "extrinsic", {"sequence": said.sequence}, {"extrinsic": True}),
+        ("euler", "extrinsic", {"sequence": declared.sequence}, {"extrinsic": True}),
         ("euler", "angles_negated", {}, {"negated": True}),
-        *(("euler", "sequence", other, other) for other in sequences),
-        *(("euler", "extrinsic", other, {**other, "extrinsic": True}) for other in sequences),
+        *(("euler", "sequence", changed, changed) for changed in sequences),
+        *(("euler", "extrinsic", changed, {**changed, "extrinsic": True}) for changed in sequences),
         ("euler", "angles_of_inverse", {}, {"negated": True, "extrinsic": True}),
         ("omega", "omega_frame", {"frame": frame, "key": f"frame = {frame}"}, {"swapped": True}),
         *(("omega", f"omega_in_{unit}", {}, {"omega": factor}) for unit, factor in UNITS_OF_OMEGA.items()),
@@ -450,20 +451,20 @@ def _readings(samples: Observations) -> Iterator[Named]:
         ("quaternion", "scalar_last_conjugate", {}, order | conjugate),
     ]
     named_so = {"omega_space": "omega", "rows": "gamma"}
-    given = {"omega", *(named_so.get(form, form) for form in forms)}  # Ω at the start
-    yield from ((kind, numbers, replace(said, **changes)) for form, kind, numbers, changes in rows if form in given)
+    in_file = {"omega", *(named_so.get(form, form) for form in forms)}  # Ω at the start
+    yield from ((kind, data, replace(declared, **changes)) for form, kind, data, changes in rows if form in in_file)
 
 
 def _axes_of_space(samples: Observations) -> Iterator[Named]:
     """Readings in which another axis points up, or one is reversed."""
-    said = samples.said
+    declared = samples.declared
     for up in ("y", "z", "x", "-z", "-y", "-x"):
-        if up != said.up:
-            yield "up", {"up": up}, replace(said, up=up)
+        if up != declared.up:
+            yield "up", {"up": up}, replace(declared, up=up)
     for axis in range(3):
         for pseudo in (True, False):
             numbers = {"axis": "xyz"[axis]}
-            yield "left_handed", numbers, replace(said, mirror=axis, pseudo=pseudo)
+            yield "left_handed", numbers, replace(declared, mirror=axis, pseudo=pseudo)
 
 
 def _bodies(samples: Observations) -> Iterator[tuple[str, dict[str, str], BodyData]]:
@@ -492,8 +493,8 @@ def _bodies(samples: Observations) -> Iterator[tuple[str, dict[str, str], BodyDa
             yield "products_of_inertia", entries, replace(body, inertia=body.inertia * signs)
         moments, axes = principal(body.inertia)
         for turn in (numpy.eye(3), *(numpy.array(matrix) for matrix, _ in _rotations())):
-            named_so, again = axes @ turn, turn.T * moments @ turn
-            yield "tensor_axes_conjugated", {}, replace(body, inertia=named_so.T @ again @ named_so)
+            named_so, reordered = axes @ turn, turn.T * moments @ turn
+            yield "tensor_axes_conjugated", {}, replace(body, inertia=named_so.T @ reordered @ named_so)
     here = next((name for name in _STANDARD if float(name) == body.gravity), None)
     standard = {f"{name}/{here}": float(name) / body.gravity for name in _STANDARD if here not in (None, name)}
     for name, factor in (_GRAVITIES | standard).items():
@@ -506,14 +507,14 @@ def _bodies(samples: Observations) -> Iterator[tuple[str, dict[str, str], BodyDa
         yield "centre_unit", {"factor": name}, replace(body, centre=body.centre * factor)
     rotor = numpy.zeros(3) if body.rotor is None else body.rotor
     for kind, numbers, inertia, centre, turned in other_axes(body.inertia, body.centre, rotor):
-        other = replace(body, inertia=inertia, centre=centre, rotor=None if body.rotor is None else turned)
-        yield "body_data_axes" if kind == "top_axes" else kind, numbers, other
+        renamed = replace(body, inertia=inertia, centre=centre, rotor=None if body.rotor is None else turned)
+        yield "body_data_axes" if kind == "top_axes" else kind, numbers, renamed
 
 
 def _in_space_axes(samples: Observations) -> Iterator[tuple[str, dict[str, str], BodyData]]:
     """Tensor, centre or both in the axes of space at the start, by either direction of the rotation."""
     body = samples.body
-    plain = samples.start.begin(replace(samples.said, up="z"), body.tensor).rotation
+    plain = samples.start.begin(replace(samples.declared, up="z"), body.tensor).rotation
     for turn in (plain, plain.T):
         turned, centre = turn.T @ body.inertia @ turn, turn.T @ body.centre
         yield "inertia_in_space_axes", {}, replace(body, inertia=turned)
@@ -533,14 +534,14 @@ def _positions(samples: Observations) -> Iterator[Row]:
         rows += [("position_unit", {"factor": name}, {"scale": factor, "displaced": moved}) for moved in (False, True)]
     if samples.body.centre.any() and not numpy.array_equal(samples.point, samples.body.centre):
         rows.append(("position_of_centre", {}, {"of_point": tuple(samples.body.centre)}))
-    yield from ((kind, numbers, {"columns": replace(samples.said, **changes)}) for kind, numbers, changes in rows)
+    yield from ((kind, numbers, {"columns": replace(samples.declared, **changes)}) for kind, numbers, changes in rows)
 
 
 def _renamed(samples: Observations) -> Iterator[Row]:
     """Axes of the body or of space in another order or reversed, without a mirror image."""
     for matrix, axes in _rotations():
-        for part, kind in (("space", "space_axes"), ("body", "body_axes")):
-            reading = replace(samples.said, space=matrix) if part == "space" else replace(samples.said, body=matrix)
+        space, body = replace(samples.declared, space=matrix), replace(samples.declared, body=matrix)
+        for kind, reading in (("space_axes", space), ("body_axes", body)):
             yield from _scopes(samples, kind, {"axes": axes}, reading)
 
 
@@ -567,38 +568,39 @@ def _fitted(samples: Observations, simulated: SimulatedMotion) -> Iterator[Row]:
     yield from _scaled(samples, simulated)
     if "position" not in samples.columns:
         return
-    said, point = samples.said, samples.point
-    positions = said.vectors(samples.columns["position"] - samples.pivot)
+    declared, point = samples.declared, samples.point
+    positions = declared.vectors(samples.columns["position"] - samples.pivot)
     true = simulated.rotation @ point
     size = float((true * true).sum())
     if size:
-        yield from _near("position_unit", float((positions * true).sum()) / size, said, "scale")
+        yield from _near("position_unit", float((positions * true).sum()) / size, declared, "scale")
     offset = (positions - true).mean(axis=0)
-    yield "pivot", {"offset": _list(offset)}, {"columns": replace(said, offset=tuple(offset)), **_FITTED}
+    yield "pivot", {"offset": _list(offset)}, {"columns": replace(declared, offset=tuple(offset)), **_FITTED}
     in_body = numpy.einsum("nji,nj->ni", simulated.rotation, positions).mean(axis=0)
-    yield "point", {"point": _list(in_body)}, {"columns": replace(said, of_point=tuple(in_body)), **_FITTED}
+    yield "point", {"point": _list(in_body)}, {"columns": replace(declared, of_point=tuple(in_body)), **_FITTED}
     design = numpy.concatenate([simulated.rotation, numpy.tile(numpy.eye(3), (len(positions), 1, 1))], axis=2)
     if len(positions) >= _FEWEST and numpy.isfinite(design).all() and numpy.isfinite(positions).all():
-        both = numpy.linalg.lstsq(design.reshape(-1, 6), positions.reshape(-1), rcond=None)[0]
-        reading = replace(said, of_point=tuple(both[:3]), offset=tuple(both[3:]))
-        numbers = {"point": _list(both[:3]), "offset": _list(both[3:])}
+        fitted = numpy.linalg.lstsq(design.reshape(-1, 6), positions.reshape(-1), rcond=None)[0]
+        reading = replace(declared, of_point=tuple(fitted[:3]), offset=tuple(fitted[3:]))
+        numbers = {"point": _list(fitted[:3]), "offset": _list(fitted[3:])}
         # a point or a pivot alone is the simpler mistake
-        if min(numpy.abs(part).max() for part in (both[:3] - point, both[3:])) > _SLIGHT * numpy.abs(both).max():
+        least = min(numpy.abs(shift).max() for shift in (fitted[:3] - point, fitted[3:]))
+        if least > _SLIGHT * numpy.abs(fitted).max():
             yield "point_and_pivot", numbers, {"columns": reading, **_FITTED}
 
 
 def _turned(samples: Observations, simulated: SimulatedMotion) -> Iterator[Row]:
     """A constant rotation of the axes of space, or of the body."""
-    said = samples.said
+    declared = samples.declared
     form = next((form for form in FORMS if form in samples.columns), None)
-    rotations = None if form is None else said.rotations(form, samples.columns[form])
+    rotations = None if form is None else declared.rotations(form, samples.columns[form])
     if rotations is None or not numpy.isfinite(rotations).all():
         return
     space = nearest_rotation((rotations @ simulated.rotation.transpose(0, 2, 1)).mean(axis=0))
     body = nearest_rotation((simulated.rotation.transpose(0, 2, 1) @ rotations).mean(axis=0))
-    if said.up == "z":
-        yield "space_turned", {"angle": _angle(space)}, {"columns": replace(said, space=_square(space)), **_FITTED}
-    yield "body_turned", {"angle": _angle(body)}, {"columns": replace(said, body=_square(body.T)), **_FITTED}
+    if declared.up == "z":
+        yield "space_turned", {"angle": _angle(space)}, {"columns": replace(declared, space=_square(space)), **_FITTED}
+    yield "body_turned", {"angle": _angle(body)}, {"columns": replace(declared, body=_square(body.T)), **_FITTED}
 
 
 def _angle(matrix: Array) -> str:
@@ -612,20 +614,20 @@ def _scaled(samples: Observations, simulated: SimulatedMotion) -> Iterator[Row]:
         if name not in samples.columns:
             continue
         true = simulated.omega_space if name == "omega_space" else simulated.omega
-        vectors, _ = samples.said.angular_velocity(name, samples.columns[name])
+        vectors, _ = samples.declared.angular_velocity(name, samples.columns[name])
         size = float((true * true).sum())
         if size:
-            yield from _near("omega_scaled", float((vectors * true).sum()) / size, samples.said, "omega")
+            yield from _near("omega_scaled", float((vectors * true).sum()) / size, samples.declared, "omega")
 
 
-def _near(kind: str, fitted: float, said: Reading, name: str) -> Iterator[Row]:
+def _near(kind: str, fitted: float, declared: Reading, name: str) -> Iterator[Row]:
     """The fitted factor of a reading, as the roundest number within 1e-9."""
     if not numpy.isfinite(fitted) or not fitted:
         return
     factor = plain_number(fitted, 1e-9 * abs(fitted))
     if factor and notable(factor, Fraction(1)):
         changes: dict[str, Any] = {name: float(factor)}
-        yield kind, {"factor": decimal_text(factor, 8)}, {"columns": replace(said, **changes), **_FITTED}
+        yield kind, {"factor": decimal_text(factor, 8)}, {"columns": replace(declared, **changes), **_FITTED}
 
 
 def _list(values: Array) -> str:
@@ -637,22 +639,22 @@ def _list(values: Array) -> str:
 def _pairs(samples: Observations) -> Iterator[Row]:
     """Two readings at once."""
     singles = [reading for reading in _readings(samples) if reading[0] != "extrinsic"] + list(_axes_of_space(samples))
-    for i, (kind, numbers, one) in enumerate(singles):
-        for other, more, two in singles[i + 1 :]:
-            if kind == other:
+    for i, (kind, numbers, first) in enumerate(singles):
+        for second_kind, second_numbers, second in singles[i + 1 :]:
+            if kind == second_kind:
                 continue
-            both = _merged(samples.said, one, two)
-            if both is not None:
-                yield from _scopes(samples, f"{kind}+{other}", {**numbers, **more}, both)
+            merged = _merged(samples.declared, first, second)
+            if merged is not None:
+                yield from _scopes(samples, f"{kind}+{second_kind}", {**numbers, **second_numbers}, merged)
 
 
-def _merged(said: Reading, one: Reading, two: Reading) -> Reading | None:
+def _merged(declared: Reading, first: Reading, second: Reading) -> Reading | None:
     """A reading with both changes; None where both change one property."""
     changes = {}
     for name in Reading.__dataclass_fields__:
-        values = [getattr(attempt, name) for attempt in (one, two) if getattr(attempt, name) != getattr(said, name)]
+        values = [value for value in (getattr(first, name), getattr(second, name)) if value != getattr(declared, name)]
         if len(values) > 1:
             return None
         if values:
             changes[name] = values[0]
-    return replace(said, **changes)
+    return replace(declared, **changes)

@@ -173,9 +173,9 @@ class Reading(Convention):
     of_point: tuple[float, ...] | None = None
 
     @classmethod
-    def of(cls, said: Convention) -> Reading:
+    def of(cls, stated: Convention) -> Reading:
         """The reading that a file declares."""
-        return cls(said.quaternion_order, said.quaternion, said.matrix, said.sequence, said.angles, said.up)
+        return cls(stated.quaternion_order, stated.quaternion, stated.matrix, stated.sequence, stated.angles, stated.up)
 
     def rotations(self, form: str, values: Array) -> Array:
         """R in canonical axes of space from the columns of ``form``, shape (n, 3, 3)."""
@@ -249,11 +249,11 @@ class GivenStart:
             rotation = replace(reading, matrix=DIRECTIONS[0]).rotations("matrix", self.values[None, :])[0]
         else:
             rotation = reading.rotations(self.form, self.values[None, :])[0]
-        said = self.omega[None, :] / reading.omega
+        scaled = self.omega[None, :] / reading.omega
         if self.in_space != reading.swapped:
-            omega = rotation.T @ reading.vectors(said, True)[0]
+            omega = rotation.T @ reading.vectors(scaled, True)[0]
         else:
-            omega = reading.body_vectors(said, True)[0]
+            omega = reading.body_vectors(scaled, True)[0]
         return InitialState(rotation, omega)
 
 
@@ -264,7 +264,7 @@ _as_read = lru_cache(maxsize=256)(GivenStart.as_read)
 class Observations:
     """Samples of a file.
 
-    times: of one sign.  columns: by the name of the quantity, shape (n, width).  body, start, said: as declared.
+    times: of one sign.  columns: by the name of the quantity, shape (n, width).  body, start, declared: of the file.
     point, pivot: of positions.
     """
 
@@ -272,7 +272,7 @@ class Observations:
     columns: Mapping[str, Array]
     body: BodyData
     start: GivenStart
-    said: Reading
+    declared: Reading
     point: Array
     pivot: Array
 
@@ -339,9 +339,9 @@ def rates_off(samples: Observations, reading: Reading) -> Array | None:
 
 def disagreement(samples: Observations) -> dict[tuple[str, str], Array]:
     """Differences of columns of one quantity in each sample, by their names; relative for Ω."""
-    columns, said = samples.columns, samples.said
+    columns, declared = samples.columns, samples.declared
     forms = [form for form in FORMS if form in columns]
-    rows = {form: said.rotations(form, columns[form]) for form in forms}
+    rows = {form: declared.rotations(form, columns[form]) for form in forms}
     errors: dict[tuple[str, str], Array] = {}
     for other in forms[1:]:
         errors[forms[0], other] = numpy.abs(rows[forms[0]] - rows[other]).max(axis=(1, 2))
@@ -353,7 +353,7 @@ def disagreement(samples: Observations) -> dict[tuple[str, str], Array]:
     if {"omega", "omega_space"} <= columns.keys():
         true = numpy.einsum("nij,nj->ni", first, columns["omega"])
         size = float(numpy.abs(true).max()) or 1.0
-        errors["omega", "omega_space"] = numpy.abs(said.vectors(columns["omega_space"]) - true).max(axis=1) / size
+        errors["omega", "omega_space"] = numpy.abs(declared.vectors(columns["omega_space"]) - true).max(axis=1) / size
     return errors
 
 

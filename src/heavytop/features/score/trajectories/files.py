@@ -110,22 +110,22 @@ def read_table(text: str, started: bool = False) -> tuple[dict[str, Any], list[s
     logs.require_understood(names, meaning.others, [*meaning.places], cells)
     cut, times = "", [] if meaning.time is None else [logs.number(row[meaning.time]) for row in cells]
     if times and None not in times:
-        kept, noted, cut = logs.without_repeats([time for time in times if time is not None], cells, lines)
-        cells, lines = [cells[i] for i in kept], [lines[i] for i in kept]
+        rows, noted, cut = logs.without_repeats([time for time in times if time is not None], cells, lines)
+        cells, lines = [cells[i] for i in rows], [lines[i] for i in rows]
         notes += noted
     units = {"omega" if name == "framed" else name: unit.name for name, unit in meaning.units.items()}
     in_units = [f"{name} is in {unit}" for name, unit in units.items() if name != "position"]
     notes += [f"as the header declares, {', '.join(in_units)}"] if in_units else []
     if meaning.unknown:
         notes.append(f"unknown units in the header, not converted: {', '.join(sorted(meaning.unknown))}")
-    more = observed_columns.is_more_than_states(meaning)
-    if more and meaning.time is None:
+    beyond_states = observed_columns.is_more_than_states(meaning)
+    if beyond_states and meaning.time is None:
         raise InputError("No column holds the times.", "Call it t, or t [ms] for milliseconds.")
-    plain = not more and not meaning.units
+    plain = not beyond_states and not meaning.units
     if plain and meaning.missing:
         raise _no_header(meaning.missing, names)
     columns = {"header": meaning, "plain": plain, "cells": cells, "lines": lines, "cut": cut}
-    unused = [*meaning.others, *(names[place] for place in _parts(meaning))]
+    unused = [*meaning.others, *(names[index] for index in _incomplete(meaning))]
     return keys | columns, notes + unread(unused, names)
 
 
@@ -197,26 +197,26 @@ def _numbers(key: str, text: str) -> list[str]:
     return numbers
 
 
-def _parts(header: observed_columns.Header) -> list[int]:
+def _incomplete(header: observed_columns.Header) -> list[int]:
     """Indices of quantities with a missing component, which are not read if Ω and γ are complete."""
     if not {"omega", "gamma"} <= header.places.keys():
         return []
-    parts = (part for name, part in header.places.items() if len(part) < WIDTHS.get(name, 3))
-    return [place for part in parts for place in part.values()]
+    incomplete = (indices for name, indices in header.places.items() if len(indices) < WIDTHS.get(name, 3))
+    return [index for indices in incomplete for index in indices.values()]
 
 
 def unread(names: Sequence[str], header: Sequence[str]) -> list[str]:
     """The note on columns that are not read, except ξ and radii, which heavytop writes itself."""
     columns = {name.strip() for name in header}
-    own = {"xi1", "xi2", "xi3"} | {f"{name}_radius" for name in columns}
-    more = [name for name in names if name.strip() not in {"", *own}]
-    return [f"ignored columns: {', '.join(name[:40] for name in more[:6])}"] if more else []
+    ours = {"xi1", "xi2", "xi3"} | {f"{name}_radius" for name in columns}
+    others = [name for name in names if name.strip() not in {"", *ours}]
+    return [f"ignored columns: {', '.join(name[:40] for name in others[:6])}"] if others else []
 
 
 def _no_header(missing: list[str], names: Sequence[str] = ()) -> InputError:
     among = f" among {', '.join(name[:20] for name in names[:9])}" if names else ""
-    said = f": {', '.join(missing)} not found{among}" if missing else ": the file has no rows"
-    return InputError(f"The header is not {','.join(COLUMNS)}{said}.", f"{logs.NAMES} {REMEDY}")
+    cause = f": {', '.join(missing)} not found{among}" if missing else ": the file has no rows"
+    return InputError(f"The header is not {','.join(COLUMNS)}{cause}.", f"{logs.NAMES} {REMEDY}")
 
 
 def _separator(line: str) -> str | None:
@@ -253,8 +253,8 @@ def _is_header(names: list[str], width: int) -> bool:
     except InputError:  # of a sentence, unless these are as many as the columns
         return len(names) == width
     has_time = header.time is not None or names[:1] == ["%time"]
-    whole = not header.missing and len(header.places["gamma"]) == 3
-    return whole or (has_time and bool(header.places) and (not header.others or len(names) == width > 2))
+    complete = not header.missing and len(header.places["gamma"]) == 3
+    return complete or (has_time and bool(header.places) and (not header.others or len(names) == width > 2))
 
 
 def _split(body: list[str], lines: list[int], separator: str | None, width: int) -> list[list[str]]:
@@ -283,15 +283,15 @@ _NONE: Vector = (Fraction(0), Fraction(0), Fraction(0))
 def require_case(case: Case, top: HeavyTop, start: State, which: System, at_start: State | None) -> None:
     """Raises InputError where file and case differ."""
     if which is not case.system:
-        raise _other(case, "system", which.name, case.system.name)
+        raise _differs(case, "system", which.name, case.system.name)
     _require_alike(case, ("weight",), [top.weight], [case.top.weight])
     for i, (new, old) in enumerate(zip(top.inertia, case.top.inertia, strict=True), 1):
         _require_alike(case, (f"I{i}",), [new], [old])
     _require_alike(case, [f"{name} of the centre" for name in "abc"], top.centre, case.top.centre)
     _require_alike(case, [f"k{i} of the rotor" for i in (1, 2, 3)], top.rotor or _NONE, case.top.rotor or _NONE)
     for state, where in ((start, ""), (at_start or start, " of the row t = 0")):
-        for part, names in (("omega", NAMES[:3]), ("gamma", NAMES[3:])):
-            _require_alike(case, [name + where for name in names], getattr(state, part), getattr(case.start, part))
+        for vector, names in (("omega", NAMES[:3]), ("gamma", NAMES[3:])):
+            _require_alike(case, [name + where for name in names], getattr(state, vector), getattr(case.start, vector))
 
 
 def require_body(case: Case, body: Body) -> None:
@@ -303,15 +303,15 @@ def require_body(case: Case, body: Body) -> None:
     _require_alike(case, ("weight",), [top.weight], [case.top.weight])
     for i, (new, old) in enumerate(zip(sorted(top.inertia), moments, strict=True), 1):
         _require_alike(case, (f"principal moment {i}",), [new], [old])
-    for what in ("centre", "rotor") if case.top.weight else ("rotor",):
-        names = [f"the {what} along principal axis {i}" for i in (1, 2, 3)]
-        _require_alike(case, names, *([_along(one, what, moment) for moment in moments] for one in (top, case.top)))
+    for vector in ("centre", "rotor") if case.top.weight else ("rotor",):
+        names = [f"the {vector} along principal axis {i}" for i in (1, 2, 3)]
+        _require_alike(case, names, *([_along(side, vector, moment) for moment in moments] for side in (top, case.top)))
 
 
-def _along(top: HeavyTop, what: str, moment: Fraction) -> Fraction:
+def _along(top: HeavyTop, vector: str, moment: Fraction) -> Fraction:
     """Length of the part of its centre or rotor along the principal axes of that moment, in double."""
-    parts = zip(top.inertia, getattr(top, what) or _NONE, strict=True)
-    return Fraction(math.hypot(*(float(part) for other, part in parts if _alike(other, moment, moment))))
+    parts = zip(top.inertia, getattr(top, vector) or _NONE, strict=True)
+    return Fraction(math.hypot(*(float(value) for inertia, value in parts if _alike(inertia, moment, moment))))
 
 
 def _alike(new: Fraction, old: Fraction, size: Fraction) -> bool:
@@ -319,17 +319,17 @@ def _alike(new: Fraction, old: Fraction, size: Fraction) -> bool:
     return abs(new - old) <= abs(size) / 1000
 
 
-def _require_alike(case: Case, names: Sequence[str], given: Sequence[Fraction], known: Sequence[Fraction]) -> None:
+def _require_alike(case: Case, names: Sequence[str], stated: Sequence[Fraction], known: Sequence[Fraction]) -> None:
     """Raises InputError for the first component of a vector that is another, relative to the largest of the case."""
     size = max(map(abs, known))
-    for name, new, old in zip(names, given, known, strict=True):
+    for name, new, old in zip(names, stated, known, strict=True):
         if not _alike(new, old, size):
-            raise _other(case, name, _briefly(new), _briefly(old))
+            raise _differs(case, name, _briefly(new), _briefly(old))
 
 
-def _other(case: Case, what: str, new: str, old: str) -> InputError:
+def _differs(case: Case, name: str, new: str, old: str) -> InputError:
     return InputError(
-        f"The file has {what} = {new}, but the case {case.name} has {old}.",
+        f"The file has {name} = {new}, but the case {case.name} has {old}.",
         f"`heavytop list --case {case.name}` shows the data. Without a case the file is scored with its own data.",
     )
 
@@ -392,7 +392,7 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
     try:
         document, notes = (_json(text), []) if is_json else read_table(text, case is not None)
         name = "given" if piped else path.stem
-        reader = _observed if observed_columns.is_observed(document) else _given
+        reader = _observed if observed_columns.is_observed(document) else _of_states
         trajectory = reader(document, name, case, normalize)
         return replace(trajectory, sha256=hashlib.sha256(content).hexdigest(), notes=(*notes, *trajectory.notes))
     except InputError as error:
@@ -428,7 +428,7 @@ def _json(text: str) -> dict[str, Any]:
     return document
 
 
-def _given(document: dict[str, Any], stem: str, case: Case | None, normalize: bool) -> GivenTrajectory:
+def _of_states(document: dict[str, Any], stem: str, case: Case | None, normalize: bool) -> GivenTrajectory:
     if isinstance(document.get("times"), list) and len(document["times"]) > MOST_STATES:
         raise too_many(len(document["times"]))
     top, times = _top(document, case), _times(document)
@@ -460,11 +460,11 @@ def _given(document: dict[str, Any], stem: str, case: Case | None, normalize: bo
 def _observed(document: dict[str, Any], stem: str, case: Case | None, normalize: bool) -> GivenTrajectory:
     """The trajectory of a document with attitudes, positions, Ω in any axes, or the data of a body."""
     times = _times(document)
-    said = observed_columns.convention(document, document.get("header"))
-    table = observed_columns.columns(document, said)
+    convention = observed_columns.convention(document, document.get("header"))
+    table = observed_columns.columns(document, convention)
     require_states(times, table.places)
     body = _body(document, case)
-    table = observed_columns.in_unit_of_body(table, document.get("header"), said, body.centre)
+    table = observed_columns.in_unit_of_body(table, document.get("header"), convention, body.centre)
     notes: tuple[str, ...] = ()
     if not body.weight and not any(body.centre) and {"position"} < set(table.values):
         table = replace(table, values={name: rows for name, rows in table.values.items() if name != "position"})
@@ -478,13 +478,13 @@ def _observed(document: dict[str, Any], stem: str, case: Case | None, normalize:
     if case is not None and not document.keys() & {"omega", "gamma", *observed_columns.STARTS}:
         raw = RawStart("gamma", case.start.gamma, case.start.omega)
     else:
-        raw = observed_columns.start(document, table, not times[0], said, not body.weight)
-    words = [word for word in observed_columns.unused(said, {*table.values, raw.form}) if word in document]
+        raw = observed_columns.start(document, table, not times[0], convention, not body.weight)
+    words = [word for word in observed_columns.unused(convention, {*table.values, raw.form}) if word in document]
     words += ["link"] if "link" in document and "file" not in document else []  # of ROS
     words += ["frame"] if observed_columns.in_space(document) and "omega_space" not in table.values else []
     notes += (f"ignored keys: {', '.join(words)}",) if words else ()
     precision = _precision(document, table.texts)
-    quantities, rows = observed(body, raw, said, table.values, table.places, precision, normalize)
+    quantities, rows = observed(body, raw, convention, table.values, table.places, precision, normalize)
     top, start = quantities.posed.top, quantities.posed.start
     require_physical(top, start)
     about = _about(document, stem, case, None in rows) | {"observed": quantities, "notes": notes}

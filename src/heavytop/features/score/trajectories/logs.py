@@ -121,7 +121,7 @@ def require_understood(
     names: of all columns; others: of those that are not read.  cells: of each row, in which four or nine neighbours
     look like a quaternion or a matrix.
     """
-    missing = [what for what, given in _GIVES.items() if not set(given) & set(quantities)]
+    missing = [quantity for quantity, givers in _GIVES.items() if not set(givers) & set(quantities)]
     if "an attitude" in missing and {"rx", "ry", "rz"} <= {re.sub(r"\W.*", "", name.strip().lower()) for name in names}:
         raise InputError(
             "The columns rx, ry, rz are ambiguous: a rotation vector, angles, or a position.",
@@ -134,7 +134,7 @@ def require_understood(
         )
     unread = [name for name in others if not _OTHER.match(name)]
     for name in unread:
-        if looks := next((what for what in missing if _LOOKS[what].search(name)), None):
+        if looks := next((quantity for quantity in missing if _LOOKS[quantity].search(name)), None):
             raise InputError(f"The column {quoted(name)} looks like {looks}, but the name is unknown.", NAMES)
         index = _INDEX.fullmatch(name)
         if index and ("an attitude" if index[1].lower() == "qpos" else "an angular velocity") in missing:
@@ -144,9 +144,9 @@ def require_understood(
             )
     for width in (4, 9) if "an attitude" in missing else ():
         for first in range(len(names) - width + 1):
-            part = slice(first, first + width)
-            if {*names[part]} <= {*unread} and _are_attitudes([row[part] for row in cells]):
-                columns = f"{quoted(names[first])} to {quoted(names[part][-1])}"
+            window = slice(first, first + width)
+            if {*names[window]} <= {*unread} and _are_attitudes([row[window] for row in cells]):
+                columns = f"{quoted(names[first])} to {quoted(names[window][-1])}"
                 raise InputError(f"The columns {columns} look like an attitude, but the names are unknown.", NAMES)
 
 
@@ -171,23 +171,23 @@ def with_one_time(
     if parts.keys() == {"s", "n"}:
         seconds, nano = parts["s"], parts["n"]
         for row in cells:
-            whole, part = number(row[seconds]), number(row[nano])
-            if whole is not None and part is not None:
-                row[seconds] = decimal_text(whole + part / 10**9, 40)
+            integer, nanoseconds = number(row[seconds]), number(row[nano])
+            if integer is not None and nanoseconds is not None:
+                row[seconds] = decimal_text(integer + nanoseconds / 10**9, 40)
             del row[nano]
         names = [re.sub(r"^timestamp\b", "epoch", name) for name in names]  # of the log, not of the message
         names[seconds] = "timestamp [s]"
         del names[nano]
     plain = [canonical(name) for name in names]
     words = [name.partition(" ")[0].lower() for name in plain]
-    for place, word in enumerate(words):
-        if word in _COUNTED and _INSTANT.match(cells[0][place]):
-            plain[place] = word  # whatever the unit
+    for position, word in enumerate(words):
+        if word in _COUNTED and _INSTANT.match(cells[0][position]):
+            plain[position] = word  # whatever the unit
             for row in cells:
-                row[place] = decimal_text(_epoch(row[place].replace(" ", "T")), 40)
+                row[position] = decimal_text(_epoch(row[position].replace(" ", "T")), 40)
         if word in _COUNTED:
             for row in cells:
-                row[place] = row[place].removesuffix(" sec")  # of a timetable of MATLAB
+                row[position] = row[position].removesuffix(" sec")  # of a timetable of MATLAB
     index = next((index for word in _COUNTED for index in _places(word, words, cells)), None)
     if index is None or (words[index] == "epoch" and {"t", "time"} & set(words)):
         return names, cells, []
@@ -204,7 +204,7 @@ def with_one_time(
     last = number(cells[-1][index]) if len(cells) > 1 else Fraction(0)
     if first == 0 or (started and last is not None and abs(first) <= abs(last - first)):
         return names, cells, []
-    note = f"times are counted from the first row, {decimal_text(first, 20)}{_kept([row[index] for row in cells])}"
+    note = f"times are counted from the first row, {decimal_text(first, 20)}{_loss([row[index] for row in cells])}"
     for row in cells:
         if (value := number(row[index])) is not None:
             row[index] = decimal_text(value - first, 40)
@@ -221,7 +221,7 @@ def _places(word: str, words: Sequence[str], cells: Sequence[Sequence[str]]) -> 
     return [index] if word in _EPOCHS or (since_1970 and last - first < first / 1000) else []
 
 
-def _kept(stamps: Sequence[str]) -> str:
+def _loss(stamps: Sequence[str]) -> str:
     """The note on the digits lost to the epoch where all stamps are doubles; empty where none are."""
     values = [(value, _last_unit(text)) for text in stamps if (value := number(text)) is not None]
     unit, (first, _), (last, _) = min(unit for _, unit in values), values[0], values[-1]
@@ -245,9 +245,9 @@ def is_unit(texts: Sequence[str]) -> bool:
 
 def _are_attitudes(rows: Sequence[Sequence[str]]) -> bool:
     """Whether four numbers that vary have length 1 in every row, or nine, as a matrix, in its rows and columns."""
-    of_matrix = [part for i in range(3) for part in (slice(3 * i, 3 * i + 3), slice(i, 9, 3))]
+    of_matrix = [entries for i in range(3) for entries in (slice(3 * i, 3 * i + 3), slice(i, 9, 3))]
     parts = [slice(4)] if len(rows[0]) == 4 else of_matrix
-    return rows[0] != rows[-1] and all(is_unit(row[part]) for row in rows for part in parts)
+    return rows[0] != rows[-1] and all(is_unit(row[entries]) for row in rows for entries in parts)
 
 
 def without_repeats(
@@ -276,12 +276,12 @@ def without_repeats(
     return kept, _repeats(repeated), ""
 
 
-def _agree(one: str, other: str) -> bool:
+def _agree(first: str, second: str) -> bool:
     """Whether two texts are one number to the digits of the shorter."""
-    a, b = number(one), number(other)
-    if one == other or a is None or b is None:
-        return one == other
-    return abs(a - b) < max(map(_last_unit, (one, other)))
+    a, b = number(first), number(second)
+    if first == second or a is None or b is None:
+        return first == second
+    return abs(a - b) < max(map(_last_unit, (first, second)))
 
 
 def _last_unit(text: str) -> Fraction:
@@ -299,11 +299,11 @@ def with_quaternion(names: Sequence[str]) -> list[str]:
         match = _OF_FOUR.fullmatch(name.partition(" ")[0])
         if match and not _OTHER.match(name):
             prefixes.setdefault(match[1].lower(), {})[match[2].lower()] = index
-    whole = {prefix: places for prefix, places in prefixes.items() if places.keys() == set("wxyz")}
-    whole = {"q": whole["q"]} if "q" in whole else whole
-    if len(whole) > 1:
-        raise InputError(f"Several columns are quaternions: {', '.join(whole)}.", "Call that of the body qw,qx,qy,qz.")
-    places = {index: f"q{axis}" for part in whole.values() for axis, index in part.items()}
+    fours = {prefix: places for prefix, places in prefixes.items() if places.keys() == set("wxyz")}
+    fours = {"q": fours["q"]} if "q" in fours else fours
+    if len(fours) > 1:
+        raise InputError(f"Several columns are quaternions: {', '.join(fours)}.", "Call that of the body qw,qx,qy,qz.")
+    places = {index: f"q{axis}" for columns in fours.values() for axis, index in columns.items()}
     return [places.get(index, name) for index, name in enumerate(names)]
 
 
@@ -412,13 +412,13 @@ _LEAPS += [(year, 7) for year in (1972, 1981, 1982, 1983, 1985, 1992, 1993, 1994
 def _epoch(text: str, system: str = "UTC") -> Fraction:
     """Seconds of an epoch, calendar date or day of the year, exactly; in UTC with the leap seconds before it."""
     clock, zone = re.fullmatch(r"(.*?)(Z|[+-]\d\d:\d\d)?", text).groups("Z")  # type: ignore[union-attr]
-    whole, _, part = clock.partition(".")
-    is_leap = system == "UTC" and whole.endswith(":59:60")
+    seconds, _, decimals = clock.partition(".")
+    is_leap = system == "UTC" and seconds.endswith(":59:60")
     for pattern in ("%Y-%m-%dT%H:%M:%S", "%Y-%jT%H:%M:%S"):
         try:
-            second = whole[:-2] + "59" if is_leap else whole
+            second = seconds[:-2] + "59" if is_leap else seconds
             moment = datetime.strptime(second + zone, f"{pattern}%z").astimezone(UTC)
-            fraction = Fraction(int(part or 0), 10 ** len(part))
+            fraction = Fraction(int(decimals or 0), 10 ** len(decimals))
         except ValueError:
             continue
         leaps = sum(month <= (moment.year, moment.month) for month in _LEAPS) if system == "UTC" else 0
