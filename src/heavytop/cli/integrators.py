@@ -165,7 +165,7 @@ def selftest(
 ) -> int:
     """Try the detectors on integrators with planted faults.
 
-    Exit 1 if a fault they should see slips through.  Takes two minutes on two cores; its part in
+    Exit 1 if one that they should detect is missed.  Takes two minutes on two cores; its part in
     `heavytop run --plan selftest` takes 15 seconds.
     """
     from heavytop import arguments

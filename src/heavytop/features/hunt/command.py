@@ -14,7 +14,7 @@ from heavytop.errors import ExitCode
 def hunt(
     integrator: Annotated[str, typer.Option(help="A name of `heavytop list`, mine.toml or mine.py:solve.")] = "heyoka",
     precision: Annotated[str, typer.Option(help="Number format.")] = "double",
-    horizon: Annotated[str, typer.Option(help="Time up to which errors count.")] = "100",
+    horizon: Annotated[str, typer.Option(help="Time up to which errors count; negative: backwards.")] = "100",
     budget: Annotated[
         str, typer.Option(help="Number of motions, or seconds such as 60s (at least 64 motions).")
     ] = "5000",

@@ -266,7 +266,7 @@ class HuntRequest:
     """The settings of a search; raises InputError for impossible ones.
 
     budget: motions, or None for ``seconds`` of processor time.  limit: in eps T^1.5, or the ratio to ``against``; None
-    for two decades beyond what is explained.  first: motions that are measured before all others.
+    for two decades above the expected error.  first: motions that are measured before all others.
     """
 
     integrator: Integrator
@@ -425,7 +425,7 @@ class _Hunt:
         return m.explained(self.eps) * max(self.law, 1.0) > _LOST
 
     def _score(self, m: MeasuredMotion) -> float:
-        """The measure that the search increases: the error over what is explained, or over that of ``against``."""
+        """The measure that the search increases: the error over the expected one, or over that of ``against``."""
         if not m.outcome or (self._is_lost(m) and not math.isinf(m.error)):
             return 0.0
         return m.error / max(self._compared_error(m), 1e-300)

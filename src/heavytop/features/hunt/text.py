@@ -26,14 +26,6 @@ def hunt_text(hunted: Hunted, documents: Sequence[dict[str, Any]], again: str) -
     return "\n".join([*lines, "Repeat the search with:", f"  {again}"])
 
 
-def law_text(hunted: Hunted) -> str:
-    """The law of the errors of this integrator."""
-    return (
-        f"{hunted.law:.2g} eps times the motion's own amplification times √(1 + rate T), "
-        "which bounds nine tenths of the random tops"
-    )
-
-
 def worst_lines(hunted: Hunted) -> list[str]:
     """A line for each of the worst motions whose error is explained."""
     eps = float(hunted.request.precision.eps)
@@ -43,15 +35,15 @@ def worst_lines(hunted: Hunted) -> list[str]:
         features = "; ".join([class_of(*m.motion), *special(m)])
         lines.append(
             f"{_right(m.error, eps)} digits right, {m.error / hunted.request.unit:.2g} eps T^1.5, "
-            f"{part:.2g} of what is explained: {features}."
+            f"{part:.2g} of the expected error: {features}."
         )
     return lines
 
 
 def _searched(hunted: Hunted) -> str:
     request = hunted.request
-    text = f"{request.integrator.name} in {request.precision.name} to T = {time_text(request.horizon)}: "
-    text += f"{plural(hunted.motions, 'motion')} tried of {hunted.planned}."
+    text = f"{len(hunted.found) or 'Nothing'} found: {request.integrator.name} in {request.precision.name} "
+    text += f"to T = {time_text(request.horizon)}, {plural(hunted.motions, 'motion')} tried of {hunted.planned}."
     if hunted.unknown:
         text += f" No reference was within reach for {hunted.unknown}."
     if hunted.lost:
@@ -66,8 +58,9 @@ def _nothing(hunted: Hunted) -> list[str]:
     elif request.limit is not None:
         beyond = f"an error of {request.limit:.3g} eps T^1.5"
     else:
-        beyond = f"an error two decades beyond what explains it: {law_text(hunted)}"
-    lines = [fill(f"Nothing found: no run failed, and none has {beyond}.", _WIDTH)]
+        law = f"{hunted.law:.2g} eps A √(1 + rate T), which bounds nine tenths of random tops"
+        beyond = f"an error two decades above the expected one: {law}; A is the amplification of the motion"
+    lines = [fill(f"No run failed, and none has {beyond}.", _WIDTH)]
     if hunted.worst:
         lines += ["The worst:", *_folded(worst_lines(hunted))]
     return lines

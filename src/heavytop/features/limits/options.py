@@ -18,7 +18,7 @@ Between = Annotated[
     str | None,
     typer.Option(
         metavar="DT",
-        help="Also the error of interpolation between samples DT apart, reduced to a divisor of the last time.",
+        help="Also the error of interpolation between samples DT apart (reduced to a divisor of the last time).",
     ),
 ]
 Within = Annotated[str | None, typer.Option(metavar="ERROR", help="With --between: the largest DT for this error.")]
