@@ -88,6 +88,7 @@ IN_FILE = [
     ("start", FINE, Log(QUATERNION, keys={"start_quaternion": START}), {}),
     ("start", FINE, Log(("omega",), keys={"omega": "0.71,-0.4,3"}), {"angle": "0"}),  # about the vertical: any fits
     ("", replace(COARSE, step=2e-4, every=2), Log(("position",)), {}),
+    ("", replace(COARSE, step=0.01, every=5), of_columns(lambda q: np.round(q, 2), *QUATERNION), {}),
     ("column_constant", FINE, column(1, lambda value: 0.25), {"column": "Ω2", "value": "0.25"}),
     ("column_scaled", FINE, column(1, lambda value: 1.02 * value), {"column": "Ω2", "factor": "1.02"}),
     ("axes_permuted", FINE, of_columns(lambda w: w[[1, 0, 2]], "omega"), {"of": "omega"}),

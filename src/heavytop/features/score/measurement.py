@@ -142,11 +142,12 @@ def _in_axes_of_file(samples: Observations) -> list[tuple[Any, ...]]:
 
 
 def _lengths(observed: Observed, times: Sequence[Fraction], precision: Precision) -> Diagnosis | None:
-    """The diagnosis of quaternions whose length differs from 1 by more than rounding."""
+    """The diagnosis of quaternions whose length differs from 1 by more than rounding, also to the digits written."""
     rows = observed.columns.get("quaternion", [])
     squares = [dot(row, row) + row[3] ** 2 for row in rows]
     off = [abs(square - 1) / (1 + Fraction(math.sqrt(square))) for square in squares]
-    if not off or max(off) <= 2**10 * precision.eps:
+    written = [2 * Fraction(rounding.error) for rounding in roundings(rows, precision)]  # by all four numbers
+    if not off or max(off) <= max([2**10 * precision.eps, *written]):
         return None
     worst = max(range(len(off)), key=lambda row: off[row])
     size = decimal_text(off[worst], 3)
