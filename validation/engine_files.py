@@ -178,7 +178,7 @@ def written(engine: Engine, log: Log) -> str:
     lines = [f"# {key}: {value}" for key, value in keys.items() if value]
     lines.append(",".join(["t", *(HEADERS[name] for name in columns)]))
     for n, time in enumerate(log.times(steps, engine.step)):
-        if n:
+        if n or not keys["start_quaternion"]:
             lines.append(",".join([repr(time), *(text(part[n]) for part in columns.values())]))
     return "\n".join(lines) + "\n"
 

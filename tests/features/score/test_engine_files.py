@@ -119,6 +119,10 @@ IN_FILE = [
      {"of": "start"}),
     ("time_unit", replace(FINE, every=10),  # a reference of a thousand times its horizon is computed
      Log(("position",), times=lambda steps, h: [1000 * n * h for n in steps]), {"factor": "0.001"}),
+    ("time_unit", replace(FINE, samples=8),  # of which the reference reaches the start alone
+     Log(QUATERNION, keys={"start_quaternion": ""}, times=lambda steps, h: [1000 * n * h for n in steps]),
+     {"factor": "0.001"}),
+    ("time_unit", FINE, Log(QUATERNION, times=lambda steps, h: [10**6 * n * h for n in steps]), {"factor": "1e-06"}),
     ("one_state", FINE, Log(QUATERNION, spoil=last_turned), {"state": "12 of 12"}),
     ("column_scaled", FINE, of_columns(lambda q: q * [1, 1, -1, 1], *QUATERNION),
      {"column": "y of the quaternion", "factor": "−1"}),

@@ -150,6 +150,7 @@ def test_a_number_in_degrees_is_converted_to_the_last_digit(tmp_path: Path) -> N
         ("p[rad/s] q[1/s] r", {"omega": "1 2 3"}),  # no index, nor in the next
         ("phi[1] theta[rad] psi[rad]", {"euler": "φ θ ψ"}),
         ("x[1] y[m] z", {"position": "x y z"}),
+        ("gx[rad/s] gy[rad/s] gz[1]", {"omega": "x y", "gamma": "z"}),  # of a gyroscope, by the unit
         # w, x, y, z beside each other are a quaternion
         ("t w x y z", {"quaternion": "w x y z"}),
         ("t x y z w", {"quaternion": "x y z w"}),

@@ -93,7 +93,7 @@ def diagnoses(trajectory: GivenTrajectory, error: float | None, errors: Sequence
         samples = observed.observations(times)
         explanations = [] if samples is None else _disagreements(samples, times)
         digits_written = rounded(_amplified(observed, roundings(states, trajectory.precision)), error)
-        if error is not None and (error <= WORTH_ASKING or digits_written):
+        if error is not None and ((error <= WORTH_ASKING and len(errors) == count) or digits_written):
             return explanations + digits_written
         lengths = _lengths(observed, times, trajectory.precision)
         if lengths is not None and (error is None or float(lengths.error or 0) >= _PART * error):

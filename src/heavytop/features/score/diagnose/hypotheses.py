@@ -575,7 +575,7 @@ _SHORT = 3
 _EXACTLY = 1e-9
 _MOST_STEPS = 300
 """Most steps of an interval between samples of which one too many or too few is recognised."""
-TIME_UNITS = {Fraction(n, d) for n, d in ((1000, 1), (60, 1), (3600, 1), (1, 1000), (1, 60), (1, 3600))}
+TIME_UNITS = {*map(Fraction, (60, 1000, 3600)), *(Fraction(1, n) for n in (60, 3600, 10**3, 10**6, 10**9))}
 _FEWEST_ROWS = 3
 _CIRCLE = (2 * numpy.pi, 1 / (2 * numpy.pi), numpy.pi / 180, 180 / numpy.pi)
 

@@ -67,6 +67,8 @@ _NAMES = {
 """Names of single components, before :data:`_PATTERNS`."""
 _AXES = {"x": "1", "y": "2", "z": "3"}
 _GREEK = ("φ", "θ", "ψ")
+_GYROSCOPE = ("gx", "gy", "gz")
+"""Names of Ω where their unit is that of a rate, otherwise of γ."""
 _CLASSIC = ("p", "q", "r")
 _TIME = ("t", "time", "timestamp", "stamp")
 _TOGETHER = (tuple("wxyz"), tuple("xyzw"), ("e0", "e1", "e2", "e3"))
@@ -171,6 +173,8 @@ def header(names: Sequence[str], joint: str = "") -> Header:
             others.append(name)
             continue
         quantity, component = meaning
+        if plain in _GYROSCOPE and _unit("omega", name).name in (*_RATE, *(f"rad{second}" for second in _A_SECOND)):
+            quantity = "omega"
         if component in indices.setdefault(quantity, {}):
             of_state = quantity in ("omega", "gamma")
             label = f"{quantity}{_AXES.get(component, component)}" if of_state else quoted(name)
