@@ -132,10 +132,10 @@ def _did(error: BaseException) -> str:
     return f"raised {type(error).__name__}" + (f": {message}" if message else "")
 
 
-def said(what: object) -> str:
+def said(value: object) -> str:
     """Third-party text as one printable line of at most 200 characters."""
     try:
-        text = str(what)
+        text = str(value)
     except Exception:  # no message can be made
         return ""
     line = " ".join("".join(c if c.isprintable() else " " for c in text[: 4 * _MOST_SAID]).split())
@@ -198,10 +198,10 @@ class Declared:
             ("the direction", direction, self.directions, (direction,)),
             ("the format", precision.name, self.precisions, (precision.name, generic)),
         )
-        for what, value, declared, names in requirements:
+        for aspect, value, declared, names in requirements:
             if declared is not None and not set(names) & set(declared):
                 can = ", ".join(declared) or "none"
-                raise Unsupported(f"{name} declares that it does not support {what} {value}.", f"It supports: {can}.")
+                raise Unsupported(f"{name} declares that it does not support {aspect} {value}.", f"It supports: {can}.")
 
     def is_singular(self, gamma: Vector) -> bool:
         """Whether its coordinates are singular at that γ."""
@@ -288,9 +288,8 @@ def with_tolerance(run: Run) -> Callable[..., Trajectory]:
 class CheckedPlugin:
     """A peer that keeps the contract: the call of :mod:`heavytop.integrate.peers`, or PeerFailed.
 
-    own: whether it is one of this program's: these say in words what they cannot be asked, end as ``non_finite``
-    where a state is not finite, which is a finding about them and no failure, and are believed their clock.
-    declared: what it says that it can do.  options: what every call is given beside a problem, such as a tolerance.
+    own: whether it is one of this program's, whose errors pass, whose non-finite states are an outcome and no failure,
+    and whose seconds are its own.  declared: its capabilities.  options: of every call, such as a tolerance.
     """
 
     def __init__(
@@ -329,35 +328,35 @@ class CheckedPlugin:
         """
         problem = Problem.of(top, start, precision, system, xi)
         beside = self.options | options if xi is None else {"xi": xi, **self.options, **options}
-        asked = [rounded(time, precision) for time in times]
-        if self.declared is not None and asked:
-            self.declared.require(self.name, start, system, asked[-1], precision, xi)
+        requested = [rounded(time, precision) for time in times]
+        if self.declared is not None and requested:
+            self.declared.require(self.name, start, system, requested[-1], precision, xi)
             if self.declared.fixed_grid:
                 beside["step"] = self.declared.step(self.name, beside.get("step", DEFAULT_STEP), times, precision)
-        # copies, so that what a peer does to its arguments is its own affair; fractions are shared by deepcopy
+        # copies, which a peer may change; fractions are shared by deepcopy
         arguments: list[Any]
-        own: dict[str, Any]
+        keywords: dict[str, Any]
         try:
-            *arguments, own = pickle.loads(pickle.dumps((top, start, tuple(times), precision, beside)))
+            *arguments, keywords = pickle.loads(pickle.dumps((top, start, tuple(times), precision, beside)))
         except pickle.PicklingError as error:
             raise PeerFailed(f"{self.name} replaced modules of heavytop: {said(error)}") from None
-        parts = {name: getattr(system, name) for name in system.__slots__}
+        attributes = {name: getattr(system, name) for name in system.__slots__}
         with contained(self.name, own=self.own):
             seconds = stopwatch()
             try:
-                run = self.call(*arguments, system=system, **own)
+                run = self.call(*arguments, system=system, **keywords)
                 spent = seconds()
             finally:
-                changed = [name for name, part in parts.items() if getattr(system, name) is not part]
+                changed = [name for name, attribute in attributes.items() if getattr(system, name) is not attribute]
                 for name in changed:
-                    object.__setattr__(system, name, parts[name])
+                    object.__setattr__(system, name, attributes[name])
                 if changed:  # whatever else it raised follows from that
                     raise PeerFailed(f"{self.name} changed the {', '.join(changed)} of the system {system.name}")
         with contained(self.name, " in what it returned"):
-            return self._kept(run, problem, asked, spent)
+            return self._checked(run, problem, requested, spent)
 
-    def _kept(self, returned: Any, problem: Problem, asked: list[Fraction], spent: float) -> Trajectory:
-        """A plain Trajectory of what was returned after ``spent`` seconds; every part of it is asked for once."""
+    def _checked(self, returned: Any, problem: Problem, requested: list[Fraction], spent: float) -> Trajectory:
+        """The returned trajectory as a plain one, checked; each attribute is read once.  spent: seconds of the call."""
         self._require(issubclass(type(returned), Trajectory), f"a {type(returned).__name__} instead of a Trajectory")
         began = perf_counter()
         run = SimpleNamespace(**{name: getattr(returned, name) for name in Trajectory.__slots__ if name != "problem"})
@@ -366,23 +365,23 @@ class CheckedPlugin:
         )
         states = tuple(self._state(state, problem) for state in run.states)
         spent += perf_counter() - began
-        self._require(len(states) <= len(asked), f"{len(states)} states for {len(asked)} times")
-        done = len(states) == len(asked)
+        self._require(len(states) <= len(requested), f"{len(states)} states for {len(requested)} times")
+        done = len(states) == len(requested)
         self._require(
             done == (run.outcome is Outcome.SUCCESS),
-            f"{len(states)} of {len(asked)} states, and the outcome {run.outcome.value}",
+            f"{len(states)} of {len(requested)} states, and the outcome {run.outcome.value}",
         )
         times = tuple(exact(time) for time in run.times)
-        self._require(times == tuple(asked[: len(states)]), "other times than it was asked for")
+        self._require(times == tuple(requested[: len(states)]), "other times than it was asked for")
         diverged = run.outcome is Outcome.NON_FINITE and not self.own
-        self._require(not diverged, f"a state that is not finite after {len(states)} of {len(asked)} times")
-        reached = asked[-1] if done else exact(run.time_reached)
-        within = reached == 0 if asked[-1] == 0 else 0 <= reached / asked[-1] <= 1
+        self._require(not diverged, f"a state that is not finite after {len(states)} of {len(requested)} times")
+        reached = requested[-1] if done else exact(run.time_reached)
+        within = reached == 0 if requested[-1] == 0 else 0 <= reached / requested[-1] <= 1
         self._require(within, f"the time {said(run.time_reached)} as reached")
         if not (done or self.own):
-            last, following = abs(times[-1]) if times else 0, abs(asked[len(states)])
-            what = f"{len(states)} of {len(asked)} states, and said that it reached t = {said(run.time_reached)}"
-            self._require(last <= abs(reached) < following, what)
+            last, following = abs(times[-1]) if times else 0, abs(requested[len(states)])
+            ended = f"{len(states)} of {len(requested)} states, and said that it reached t = {said(run.time_reached)}"
+            self._require(last <= abs(reached) < following, ended)
         named = type(run.integrator) is str and 0 < len(run.integrator) <= _MOST_SAID and run.integrator.isprintable()
         self._require(named, "no integrator name")
         seconds = {name: self._seconds(run.seconds[name]) for name in ("compile", "run")}
@@ -411,8 +410,8 @@ class CheckedPlugin:
         dtype = getattr(state, "dtype", None)
         self._require(dtype is None or dtype != numpy.dtype(object), "an array of objects as a state")
         values = list(state)
-        asked = "6" if width == 6 else "9, Ω, γ and ξ: it carries the attitude"
-        self._require(len(values) == width, f"a state of {len(values)} components instead of {asked}")
+        expected = "6" if width == 6 else "9, Ω, γ and ξ: it carries the attitude"
+        self._require(len(values) == width, f"a state of {len(values)} components instead of {expected}")
         native = type(number(Fraction(1), precision))
         for value in values:
             plain = isinstance(value, native | Real) and not isinstance(value, bool | numpy.bool_)
@@ -437,16 +436,15 @@ class CheckedPlugin:
         return dict(flags)
 
 
-def require_equal(name: str, one: Trajectory, other: Trajectory) -> None:
+def require_equal(name: str, first: Trajectory, second: Trajectory) -> None:
     """Raises PeerFailed where two runs of one and the same call are not the same, bit for bit."""
-    if (one.outcome, one.time_reached, one.steps) != (other.outcome, other.time_reached, other.steps):
-        ends = (f"{run.outcome.value} at t = {said(run.time_reached)} in {run.steps} steps" for run in (one, other))
+    if (first.outcome, first.time_reached, first.steps) != (second.outcome, second.time_reached, second.steps):
+        ends = (f"{run.outcome.value} at t = {said(run.time_reached)} in {run.steps} steps" for run in (first, second))
         raise PeerFailed(f"{name} ended two equal calls as {' and as '.join(ends)}")
-    for time, *states in zip(one.times, one.states, other.states, strict=True):
+    for time, *states in zip(first.times, first.states, second.states, strict=True):
         for component, *values in zip(
             (*NAMES, "ξ1", "ξ2", "ξ3"), *(map(exact, state) for state in states), strict=False
         ):
             if values[0] != values[1]:
-                first, second = (decimal_text(value, 17) for value in values)
-                where = f"{component} at t = {six_digits(time)}"
-                raise PeerFailed(f"{name} returned {first} and {second} as {where} in two equal calls")
+                texts = " and ".join(decimal_text(value, 17) for value in values)
+                raise PeerFailed(f"{name} returned {texts} as {component} at t = {six_digits(time)} in two equal calls")

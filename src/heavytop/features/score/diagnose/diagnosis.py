@@ -119,7 +119,7 @@ def _explanation(searches: Sequence[Search], examined: Examined | None) -> Diagn
     """The explanation of the states, by the first search that has one, over all samples or the first ones."""
 
     def sure(first: int | None = None) -> Diagnosis | None:
-        return next((told for search in searches if (told := search.sure(first)) is not None), None)
+        return next((fit for search in searches if (fit := search.sure(first)) is not None), None)
 
     exact = sure()
     if exact is None and examined is not None:
@@ -132,9 +132,9 @@ def _explanation(searches: Sequence[Search], examined: Examined | None) -> Diagn
     if exact is not None:
         return exact
     for first in (None, *FIRST):
-        guesses = [told for search in searches if (told := search.sure(first, LIKELY_DROP)) is not None]
+        guesses = [fit for search in searches if (fit := search.sure(first, LIKELY_DROP)) is not None]
         if guesses:
-            return min(guesses, key=lambda told: (told.left or 0.0) / (told.error or 1.0))
+            return min(guesses, key=lambda fit: (fit.left or 0.0) / (fit.error or 1.0))
     return None if examined is None else _looked_at(examined, _integrals_off(examined))
 
 
@@ -210,10 +210,10 @@ def _reset(examined: Examined | None) -> Diagnosis | None:
         rows = range(row, min(row + _FOLLOWED, len(times)))
         nearest = int(numpy.abs((orbit - every.states[row]) / sizes).max(axis=1).argmin())
         expected = every.follows(row - 1)
-        again = every.at([every.rows[n] for n in rows])
-        moved = again.simulated([time - every.times[row] + Fraction(grid[nearest]) for time in again.times])
+        repeated = every.at([every.rows[n] for n in rows])
+        moved = repeated.simulated([time - every.times[row] + Fraction(grid[nearest]) for time in repeated.times])
         jumps = expected is not None and _apart(every, every.states[row], expected) > _JUMPS
-        left, error = float(again.errors(moved).max()), float(errors[rows].max())
+        left, error = float(repeated.errors(moved).max()), float(errors[rows].max())
         if jumps and left * _AGAIN <= error:
             return Diagnosis("reset", {"t": in_units(times[row], every.units.time)}, error, left)
     return None
@@ -225,30 +225,30 @@ def _still(
     """At least three last states, or their Ω or γ, that are equal although the motion changes there."""
     if examined is None or (relative_error is not None and relative_error <= _WRONG):
         return None
-    for name, part in _VECTORS.items():
-        rows = [list(state[part]) for state in states]
-        same = next((n for n, row in enumerate(reversed(rows)) if row != rows[-1]), len(rows))
-        if same < _FEWEST_STILL or not _moves(examined, len(rows) - same, part):
+    for name, components in _VECTORS.items():
+        rows = [list(state[components]) for state in states]
+        count = next((n for n, row in enumerate(reversed(rows)) if row != rows[-1]), len(rows))
+        if count < _FEWEST_STILL or not _moves(examined, len(rows) - count, components):
             continue
-        if same < len(rows):
-            first = in_units(examined.all_times[-same], examined.units.time)
+        if count < len(rows):
+            first = in_units(examined.all_times[-count], examined.units.time)
             of = {"vector": name} if name else {}
-            return Diagnosis("frozen", {"t": first, "states": f"{same} of {len(states)}", **of})
+            return Diagnosis("frozen", {"t": first, "states": f"{count} of {len(states)}", **of})
         if not name:
             return Diagnosis("constant")
     return None
 
 
-def _moves(examined: Examined, row: int, part: slice) -> bool:
+def _moves(examined: Examined, row: int, components: slice) -> bool:
     """Whether the motion from the start, or that from the state of ``row``, moves from there to the next sample."""
     true, here = examined.simulated(examined.all_times[row : row + 2]), examined.all_states[row]
     pairs = [(here, examined.follows(row))] + ([] if true is None else [(true[0], true[1])])
-    return any(after is not None and _apart(examined, after, before, part) > _WRONG for before, after in pairs)
+    return any(after is not None and _apart(examined, after, before, components) > _WRONG for before, after in pairs)
 
 
-def _apart(examined: Examined, one: Array, other: Array, part: slice = _WHOLE) -> float:
+def _apart(examined: Examined, first: Array, second: Array, part: slice = _WHOLE) -> float:
     """How far two states, or parts of them, are apart, relative to the size of Ω and of γ."""
-    return float((numpy.abs(one - other) / numpy.repeat([examined.rate, 1.0], [3, len(one) - 3]))[part].max())
+    return float((numpy.abs(first - second) / numpy.repeat([examined.rate, 1.0], [3, len(first) - 3]))[part].max())
 
 
 def _off_alone(examined: Examined | None, times: Sequence[Fraction], errors: Array) -> Diagnosis | None:
@@ -275,9 +275,9 @@ def _off_alone(examined: Examined | None, times: Sequence[Fraction], errors: Arr
     return Diagnosis("one_state" if len(off) == 1 else "some_states", numbers, error, left, looked_at)
 
 
-def _gap(error: float, other: float) -> bool:
+def _gap(error: float, next_error: float) -> bool:
     """Whether the first error is that of an outlier, and the other that of a right state."""
-    return bool(error > WORTH_ASKING and error >= _ALONE * other and other <= _RIGHT)
+    return bool(error > WORTH_ASKING and error >= _ALONE * next_error and next_error <= _RIGHT)
 
 
 def _jumps(examined: Examined | None, times: Sequence[Fraction], last: int, errors: Array) -> bool:
@@ -349,8 +349,8 @@ def _integrals_off(examined: Examined) -> Diagnosis | None:
             numbers[integral.name] = f"{in_units(values.mean(), unit)}, not {in_units(at_start, unit)}"
         elif off <= _OFF * size:
             numbers[integral.name] = AS_AT_START
-    told = set(numbers.values()) - {VARIES, AS_AT_START}
-    return Diagnosis("integrals_off", numbers, error) if told else None
+    differing = set(numbers.values()) - {VARIES, AS_AT_START}
+    return Diagnosis("integrals_off", numbers, error) if differing else None
 
 
 def _sizes(examined: Examined) -> dict[str, tuple[float, Fraction]]:
