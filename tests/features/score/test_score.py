@@ -139,7 +139,7 @@ def test_what_is_not_finite_is_a_verdict(word: str, tmp_path: Path) -> None:
         ({"times": ["1", "nan", "3"]}, "Row 2, t must be finite; got nan"),
         ({"times": "1,2,3"}, "times is not a list"),
         ({"states": [["1"] * 5] * 3}, "states[0] has 5 numbers, not 6"),
-        ({"states": [["1"] * 6, "x", ["1"] * 6]}, "states[1] is not a list"),
+        ({"states": [["1"] * 6, "x", ["1"] * 6]}, "states[1] must be a list; got 'x'"),
         ({"states": [["1", "2", "three", "4", "5", "6"]] * 3}, "states[0][2]: 'three' is not a finite number"),
         ({"states": [[None] * 6] * 3}, "states[0][0] must be a number; got a NoneType"),
         ({"states": [[True] * 6] * 3}, "states[0][0] must be a number; got a bool"),

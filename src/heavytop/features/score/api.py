@@ -12,11 +12,11 @@ import numpy
 
 from heavytop import arguments
 from heavytop.arguments import Number, Numbers, required
-from heavytop.display import Tabular, TitledTable, plural
+from heavytop.display import Tabular, TitledTable
 from heavytop.errors import ExitCode, InputError, quoted
 from heavytop.features.score.measurement import Assessment, assess, passed
 from heavytop.features.score.text import diagnosis_text, score_report, to_json
-from heavytop.features.score.trajectories.columns import USED_BY, unused
+from heavytop.features.score.trajectories.columns import USED_BY, numbers_of_row, unused
 from heavytop.features.score.trajectories.observed import (
     GivenTrajectory,
     of_arrays,
@@ -64,16 +64,8 @@ def columns(arrays: Mapping[str, Any], states: list[list[Any]] | None) -> dict[s
 
 
 def _rows(values: Any, name: str) -> list[list[Any]]:
-    remedy = f"Give an array of shape {_SHAPES.get(name, '(n, 3)')}."
-    rows = []
-    for i, row in enumerate(ordered(values, name, remedy)):
-        numbers = ordered(row, f"{name}[{i}]", remedy)
-        if name == "matrix" and len(numbers) == 3:
-            numbers = [value for part in numbers for value in ordered(part, f"{name}[{i}]", remedy)]
-        if len(numbers) != (width := WIDTHS.get(name, 6)):
-            raise InputError(f"{name}[{i}] has {plural(len(numbers), 'number')}, not {width}.", remedy)
-        rows.append(numbers)
-    return rows
+    rows = ordered(values, name, f"Give an array of shape {_SHAPES.get(name, '(n, 3)')}.")
+    return [numbers_of_row(row, WIDTHS.get(name, 6), f"{name}[{i}]") for i, row in enumerate(rows)]
 
 
 _PARTS = ("omega", "gamma", "along", "across")

@@ -26,7 +26,7 @@ from heavytop.features.score.trajectories.logs import (
 )
 from heavytop.features.score.trajectories.observed import RawStart
 from heavytop.measure.attitude_error import FRAMES, WIDTHS, Convention
-from heavytop.precision import Vector, dot, exact, log10, vector
+from heavytop.precision import Vector, dot, exact, log10, ordered, vector
 
 REMEDY = "`heavytop docs score` lists the column names."
 _UNIT = re.compile(r"(?:(deg(?:rees?)?|°)|rad(?:ians?)?)\s*[\])]?$", re.IGNORECASE)
@@ -565,7 +565,7 @@ def _of_lists(document: Mapping[str, Any], convention: Convention) -> ColumnTabl
     space = in_space(document)
     states = document.get("states")
     if states is not None:
-        rows = [_flat(row, 6, f"states[{i}]") for i, row in enumerate(listed(states, "states"))]
+        rows = [numbers_of_row(row, 6, f"states[{i}]") for i, row in enumerate(listed(states, "states"))]
         columns["omega_space" if space else "omega"] = "states", [row[:3] for row in rows]
         columns["gamma"] = "states", [row[3:] for row in rows]
     for key, name in _ARRAYS.items():
@@ -575,7 +575,7 @@ def _of_lists(document: Mapping[str, Any], convention: Convention) -> ColumnTabl
             name = "omega_space"
         if name in columns:
             raise InputError(f"{key} and {columns[name][0]} both give {name}.", "Give each quantity once.")
-        columns[name] = key, [_flat(row, WIDTHS[name], f"{key}[{i}]") for i, row in enumerate(document[key])]
+        columns[name] = key, [numbers_of_row(row, WIDTHS[name], f"{key}[{i}]") for i, row in enumerate(document[key])]
     counts = {key: len(rows) for key, rows in columns.values()}
     times = document.get("times")
     if isinstance(times, list):
@@ -600,14 +600,15 @@ def _is_table(value: object, name: str) -> bool:
     return name != "matrix" or len(value[0]) == WIDTHS["matrix"] or (bool(value[0]) and isinstance(value[0][0], list))
 
 
-def _flat(row: Any, width: int, what: str) -> list[Any]:
-    """The numbers of one row: a matrix row by row."""
-    if isinstance(row, list) and width == 9 and len(row) == 3 and all(isinstance(part, list) for part in row):
-        row = [value for part in row for value in part]
-    if not isinstance(row, list) or len(row) != width:
-        has = f"has {plural(len(row), 'number')}, not {width}" if isinstance(row, list) else "is not a list"
-        raise InputError(f"{what} {has}.", f"Give {width} numbers.")
-    return row
+def numbers_of_row(row: Any, width: int, what: str) -> list[Any]:
+    """The numbers of one row of any kind of list, as they are: of a matrix, row by row."""
+    remedy = f"Give {width} numbers."
+    numbers = ordered(row, what, remedy)
+    if width == 9 and len(numbers) == 3:
+        numbers = [value for part in numbers for value in ordered(part, what, remedy)]
+    if len(numbers) != width:
+        raise InputError(f"{what} has {plural(len(numbers), 'number')}, not {width}.", remedy)
+    return numbers
 
 
 def start(
@@ -679,7 +680,7 @@ def _attitude(value: object, name: str, key: str, convention: Convention) -> tup
     """The numbers of one attitude, and whether they are angles in degrees, declared or written as 30deg."""
     if isinstance(value, str):
         value = value.replace(",", " ").split()
-    values = _flat(value, WIDTHS[name], key)
+    values = numbers_of_row(value, WIDTHS[name], key)
     marked = [isinstance(value, str) and value.strip().endswith("deg") for value in values]
     if any(marked) and (name != "euler" or not all(marked)):
         raise InputError(f"{key} = {quoted(value)} mixes units.", "Give deg with every angle, or with none.")
