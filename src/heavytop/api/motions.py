@@ -52,7 +52,7 @@ EnsembleObserver: TypeAlias = Callable[[int, Fraction, Any], object]
 
 
 class RunOptions(TypedDict, total=False):
-    """How a run is computed, as :func:`propagate` says; None, or none, for what the integrator does by itself."""
+    """Options of a run, as :func:`propagate` describes them; None for the default of the integrator."""
 
     tolerance: Number | None
     high_accuracy: bool | None

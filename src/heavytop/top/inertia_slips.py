@@ -41,7 +41,7 @@ _TYPICAL = 300
 """kg/m³ of a fifth of the cube around a body."""
 _SMALL = Fraction(1, 10**9)
 _ROUNDINGS = Fraction(1, 2**48)
-"""Of the largest entry, by which a tensor that was multiplied in double may miss symmetry."""
+"""Largest asymmetry of a tensor computed in double, relative to its largest entry."""
 _SHOWN_BITS = 56
 
 

@@ -38,7 +38,7 @@ _REMEDY = (
 )
 _LONGEST, _DEEPEST, _HIGHEST, _MOST_TERMS = 1000, 100, 32, 2000
 _TERMS = 24
-"""Of a Taylor series at the start, which is asked for more where these vanish, of a polynomial of some degree."""
+"""First length of a Taylor series at the start; it is extended where all of these terms vanish."""
 _context = fmpq_mpoly_ctx.get(VARIABLES, Ordering.lex)
 
 

@@ -36,7 +36,7 @@ _AGAINST = Against("proven", "known: validated enclosure of each step from where
 
 
 ERROR = Quantity("error", statistic="final")
-"""Of the run of a method that keeps a memory, at its end, largest component."""
+"""Error at the end of a run of a method with a memory, largest component."""
 _LARGEST = local_error.LOCAL_ERROR.over("max").text
 _NOTES = (
     "Each compared with the proven motion from where it starts.",
@@ -159,7 +159,7 @@ def _cells(row: Row) -> list[Cell]:
 
 
 def _told(rows: Sequence[Row]) -> list[Row]:
-    """Those that have an error; of third-party integrators alone where there are any."""
+    """The rows with an error; those of third-party integrators alone where there are any."""
     theirs = [row for row in rows if row.key.subject.name != HEYOKA]
     return [row for row in theirs or rows if any(_number(row, metric) for metric in (_LARGEST, ERROR.text))]
 

@@ -196,7 +196,7 @@ def _judge_information(old: Law, new: Law, noise: float) -> Judged | None:
 _NOT_NUMBERS = (NAN, MISSING)
 _WORDS = frozenset((*_NOT_NUMBERS, UNRESOLVED))
 _LOST_SHARE = 10
-"""One in so many samples, and two more, may become unresolved."""
+"""Up to n/10 + 2 of n samples may become unresolved."""
 
 
 def judge_series(old: Series, new: Series, allowed: float, floor: float, exactly: bool) -> Judged:

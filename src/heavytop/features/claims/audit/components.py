@@ -196,7 +196,7 @@ class UserComponent(UserIntegral):
         return replace(quadrature, expression=f, needs=needs)
 
     def _kept_real(self, need: Need, f: sympy.Expr) -> Iterator[Need]:
-        """What remains to be proven of a condition on u for it to hold wherever u moves, but for single values of u.
+        """The conditions that imply this one wherever u moves, except at single values of u.
 
         There f(u) = u'^2 > 0, and R = f/c^2 has its sign.  A polynomial R with f = R g keeps its sign at the start: u
         turns or rests at a zero of R.  Where R is 0 at the start, it takes the sign of g.  A divisor, or the argument

@@ -115,7 +115,7 @@ class ConventionSearch(Search):
             yield from map(self._tried, _pairs(self.samples))
 
     def counted(self, error: float, looked: int) -> float:
-        """Of the first positions, where nothing else is given, as far as they move, and of two nothing.
+        """As for all searches; of the first positions alone at most the distance that they move, of two none.
 
         Many readings explain where positions begin.
         """

@@ -485,7 +485,7 @@ _TERMS = (
     ("γ", _GAMMA[:1], "γ{0} Ω{1}"),
     ("γ", _GAMMA[1:], "γ{1} Ω{0}"),
 )
-"""Of each term the vector whose derivative it enters, its rows of weights, and its text from the two other axes."""
+"""Each term: the vector whose derivative it enters, its rows of weights, and its text from the two other axes."""
 _SIGNS = {
     "kinematic_sign": (_GAMMA, -1.0),
     "gyroscopic_sign": (_GYROSCOPIC, -1.0),

@@ -147,7 +147,7 @@ Square = tuple[tuple[float, ...], ...]
 
 @dataclass(frozen=True, slots=True)
 class Reading(Convention):
-    """One reading of the columns, or of the start: a convention, and what no file may declare.
+    """A reading of the columns or of the start: a convention, and changes that no file can declare.
 
     extrinsic, negated: of Euler angles.  swapped: Ω declared in body axes is in space axes, and conversely.
     omega, gamma: factors of the columns of Ω and γ.  momentum: the columns of Ω are M.

@@ -24,9 +24,9 @@ Array = NDArray[numpy.float64]
 WORTH_ASKING = 1e-10
 """Relative errors below it are not diagnosed."""
 ALIKE = 30.0
-"""Of hypotheses whose errors differ by less than this factor the simplest is accepted; ..."""
+"""Factor within which errors of hypotheses count as equal: the simplest is accepted."""
 AS_LIKELY = 3.0
-"""... of likely ones by less than this."""
+"""The same factor for likely hypotheses."""
 FLOOR = 1e-13
 """Relative errors below it are heyoka's own."""
 DROP = 100.0

@@ -142,7 +142,7 @@ class Header:
 
     @property
     def missing(self) -> list[str]:
-        """What a table of states needs and has not: t, Ω, γ."""
+        """The quantities that a table of states lacks: t, Ω, γ."""
         given = {"t": self.time is not None, "Ω": {"omega", "framed"} & self.places.keys(), "γ": "gamma" in self.places}
         return [name for name, there in given.items() if not there]
 
