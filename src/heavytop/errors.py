@@ -71,9 +71,11 @@ def invalid(error: Exception, kind: type | None = None) -> str:
         # decimals of a plan are text
         is_number = match[2] == "str" and match[1].startswith(("int", "float"))
         return f"{path} must be {expected}" + ("" if is_number else f"; got {_TYPES.get(match[2], match[2])}")
-    if match := re.fullmatch(r"Expected `([^`]*)` (?:of length )?([<>=]+) (\d+)", text):
+    if match := re.fullmatch(r"Expected `([^`]*)` (?:of length )?((?:[<>=]+ )?\d+)(, got \d+)?", text):
         what = "of length " if match[1] in ("array", "str") else ""
-        return f"{path} must be {_TYPES.get(match[1], match[1])} {what}{match[2]} {match[3]}"
+        return f"{path} must be {_TYPES.get(match[1], match[1])} {what}{match[2]}{match[3] or ''}".replace(
+            ", got", "; got"
+        )
     if match := re.fullmatch(r"Object missing required field `(.*)`", text):
         return f"{path} lacks the key {match[1]}"
     if match := re.fullmatch(r"Object contains unknown field `(.*)`", text, re.DOTALL):
@@ -83,7 +85,7 @@ def invalid(error: Exception, kind: type | None = None) -> str:
     if text.startswith("Expected `str` matching regex"):
         return f"{path} must be {_rule(kind, path)}"
     if (match := re.fullmatch(r"Invalid enum value (.*)", text)) and (words := _words(kind, path)):
-        return f"{path} = {match[1]}: {' or '.join(filter(None, (', '.join(words[:-1]), words[-1])))}"
+        return f"{path} must be {' or '.join(filter(None, (', '.join(words[:-1]), words[-1])))}; got {match[1]}"
     return str(error)
 
 

@@ -24,7 +24,8 @@ WORK = (
     "[[measure]]\nkind = 'work_precision'\ncases = ['euler']\nhorizon = '10'\n"
     "ladders = [{ integrator = 'heyoka', tolerances = ['1e-3', '0.001'] }]\n"
 )
-PROGRAMS = "".join(f"[[integrator]]\nname = '{name}'\ncommand = ['x']\n" for name in "abc")
+PROGRAM = "[[integrator]]\nname = 'a'\ncommand = ['x']\n"
+PROGRAMS = "".join(PROGRAM.replace("'a'", f"'{name}'") for name in "abc")
 AUDIT = "[[measure]]\nkind = 'audit'\nclaims = ['ershkov-partial']\n"
 LIBRARY = AUDIT.replace("ershkov-partial", "library")
 CARRIED = AUDIT.replace("ershkov-partial", "sretensky-gyrostat")
@@ -122,6 +123,11 @@ def test_the_asymptotic_case_tends_to_its_saddle_at_its_rate() -> None:
         (WORK, "heyoka tolerance=0.001 double twice, also as work_precision euler/T=10 heyoka tol"),
         (f"{ONE}{ONE.replace('10', '1e1')}", "twice, also as work_precision euler/T=10 heyoka tolerance=1e-3"),
         (GROWTH, "tolerance 1.0e-3 double twice, also as growth euler heyoka tolerance 1e-3 double"),
+        (ONE.replace("tolerances", "steps"), "Leave it out: tolerance sets the accuracy of heyoka"),
+        (
+            f"{ONE.replace('heyoka', 'a').replace('tolerances', 'steps')}{PROGRAM}",
+            "The integrator a does not support step",
+        ),
         ("[[measure]", "not valid"),
         (f"name = '../evil'\n{MEASURE}", "letters, digits"),
         (MEASURE.replace("10", "1e400"), "too large"),

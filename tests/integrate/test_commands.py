@@ -357,8 +357,10 @@ def toml(folder: Path, extra: str = "", table: str = TABLE) -> Path:
     [
         ('colour = "red"', "unknown field `colour`"),
         ("folder = 'x'", "unknown field `folder`"),
-        ('setting = "speed"', "setting = 'speed': step, tolerance or none"),
-        ("timeout = 0", "timeout = 0"),
+        ('setting = "speed"', "setting must be step, tolerance or none; got 'speed'"),
+        ("singular_at = [[0, 1]]", "singular_at[0] must be a list of length 3; got 2"),
+        ('setting = "none"\nfixed_grid = true', 'fixed_grid needs setting = "step"'),
+        ("timeout = 0", "timeout must be positive and at most 10000000 seconds; got 0"),
         ("timeout = nan", "timeout"),
         ('timeout = "soon"', "soon"),
         ('precisions = ["single"]', "Unknown precision 'single'"),

@@ -29,7 +29,17 @@ from heavytop.files import read_whole, readable
 from heavytop.harness import BUILT_IN, OF_FEATURES
 from heavytop.harness.rows import Kinds, PlanTable, Task
 from heavytop.harness.sweeps import Sweep
-from heavytop.integrate.registry import IntegratorSource, command_of, commands_in, is_third_party, named, seconds_of
+from heavytop.integrate.peers.command import Command
+from heavytop.integrate.registry import (
+    IntegratorSource,
+    command_of,
+    commands_in,
+    control_name,
+    is_third_party,
+    named,
+    no_option,
+    seconds_of,
+)
 from heavytop.integrate.registry import known as known_integrators
 from heavytop.integrate.registry import require as require_integrator
 from heavytop.integrate.trajectory import Problem
@@ -404,10 +414,17 @@ def _with_exact_control(key: RowKey) -> RowKey:
 
 
 def _require_fit(task: Task) -> None:
-    """Raises InputError, with the name of the task, where its format is unavailable or cannot represent its data."""
+    """Raises InputError, with the name of the task, where its format is unavailable or cannot represent its data, and
+    where its integrator, if that is known without running it, has no such control parameter.
+    """
     if task.case is None or not task.has_precision:
         return
     with prefixed(f"{task.label}"):
+        subject, which = task.key.subject, task.source or task.key.subject.name
+        if subject.what == "computed" and (isinstance(which, Command) or not is_third_party(subject.name)):
+            for option in {"step", "tolerance"} - {control_name(which)}:
+                if getattr(subject, option) not in ("", FINEST):
+                    raise no_option(which, option)
         precision = require(task.precision)
         Problem.of(task.case.top, task.case.start, precision, task.case.system)
         for time in task.times[:1] + task.times[-1:]:

@@ -307,6 +307,8 @@ def described(which: str | IntegratorSource, set_to: tuple[str, Fraction] | None
         record = INTEGRATORS.get(which) or foreign(which)
     else:
         record = which if isinstance(which, Integrator) else foreign(which.name, source=which)
+        if isinstance(which, Command):
+            record = replace(record, control=which.control)
     return record if set_to is None else replace(record, set_to=set_to)
 
 
@@ -437,12 +439,11 @@ def _require_possible(command: Command) -> None:
         raise InputError("command is empty.")
     if any("\0" in part for part in command.command):
         raise InputError("command holds a NUL character.")
-    if not isinstance(command.timeout, str) and command.timeout != command.timeout:
-        raise InputError("timeout is not a number.")
-    if not 0 < exact(str(command.timeout)) <= _MOST_SECONDS:
-        raise InputError(f"timeout = {quoted(command.timeout)} is not above 0 and up to {_MOST_SECONDS} seconds.")
+    seconds_of(command.timeout, "timeout")
     if command.order < 0:
         raise InputError(f"order must not be negative; got {command.order}.")
+    if command.fixed_grid and command.control != "step":
+        raise InputError('fixed_grid needs setting = "step".')
     _ = command.declared  # raises for impossible capabilities
 
 
@@ -544,9 +545,7 @@ def _program(command: Command, control: tuple[str, Fraction] | None) -> Peer:
 def control_name(which: str | IntegratorSource) -> str:
     """The control of a peer: "step", "tolerance", or "" for neither, as for one that cannot be used."""
     integrator = described(which)
-    if isinstance(integrator.source, Command):
-        return integrator.source.control
-    if integrator.control:
+    if integrator.control or isinstance(integrator.source, Command):
         return integrator.control
     for name in _CONTROLS:
         try:
@@ -751,9 +750,9 @@ def _names(function: Callable[..., Any]) -> frozenset[str] | None:
     return frozenset(parameters)
 
 
-def no_option(name: str, option: str) -> InputError:
+def no_option(which: str | IntegratorSource, option: str) -> InputError:
     """The error of an option that an integrator does not have: what sets its accuracy, or who has that option."""
-    entry = described(name)
+    entry, name = described(which), name_of(which)
     if option in _CONTROLS and entry.control:
         remedy = f"Leave it out: {argument(entry.control)} sets the accuracy of {name}."
     else:
