@@ -75,10 +75,14 @@ def test_a_fault_of_heavy_gyrostats_is_found_shrunk_and_kept(monkeypatch: pytest
 
 
 @pytest.mark.slow
-def test_a_healthy_integrator_has_none_and_says_what_explains_its_worst() -> None:
-    hunt = ht.hunt(budget=96, horizon=4, seed=3)
+@pytest.mark.parametrize(
+    ("integrator", "horizon", "law"), [("heyoka", 4, "eps √(1 + rate T)"), ("splitting:4", 20, "(rate h)^order")]
+)
+def test_a_healthy_integrator_has_none_and_says_what_explains_its_worst(integrator, horizon: int, law: str) -> None:
+    hunt = ht.hunt(integrator, budget=96, horizon=horizon, seed=3)
     assert (hunt.found, hunt.motions, hunt.seed) == ([], 96, 3)
     assert "Nothing found" in str(hunt)
+    assert law in str(hunt)
     assert "--budget 96 --seed 3" in str(hunt)
 
 

@@ -86,8 +86,9 @@ class HuntKind(Kind):
             return failed(task, _cause(hunted))
         lost = f"{hunted.lost} of which no format of its size can follow"
         measured = f"the worst of {plural(hunted.motions, 'motion')}, {lost}"
-        law = f"{hunted.law:.2g} eps times the motion's amplification times √(1 + rate T)"
-        return exact_row(task, measured, Against("equations", law), _metrics(hunted), request.precision.bits)
+        return exact_row(
+            task, measured, Against("equations", hunted.law_text), _metrics(hunted), request.precision.bits
+        )
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
         """The search that came nearest to a finding; a line for each row."""

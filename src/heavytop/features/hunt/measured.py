@@ -25,6 +25,7 @@ from heavytop.harness.sweeps import Random
 from heavytop.integrate import registry
 from heavytop.integrate.multiword.lanes import propagate_multiword_ensemble
 from heavytop.integrate.peers.command import Command, begin_row
+from heavytop.integrate.peers.contract import DEFAULT_STEP
 from heavytop.integrate.registry import Integrator, is_third_party
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, Vector, dot, exact, number, real, round_to, rounded
@@ -43,11 +44,15 @@ _BEGIN = 60.0
 
 
 class IntegratedRun(NamedTuple):
-    """The outcome of a run and its states, one per time, in native numbers; reason: why it was aborted."""
+    """The outcome of a run and its states, one per time, in native numbers; reason: why it was aborted.
+
+    order: of a method with fixed steps; 0 of others.
+    """
 
     outcome: str
     states: Sequence[Any]
     reason: str = ""
+    order: int = 0
 
 
 def integrated(
@@ -67,10 +72,11 @@ def integrated(
     except HeavyTopError as error:
         return IntegratedRun(FAILED, (), error.cause)
     short = run.outcome is Outcome.SUCCESS and len(run.states) < len(times)
-    return IntegratedRun((Outcome.INCOMPLETE if short else run.outcome).value, run.states)
+    order = run.order if _control(integrator) == "step" else 0
+    return IntegratedRun((Outcome.INCOMPLETE if short else run.outcome).value, run.states, order=order)
 
 
-_loaded = lru_cache(maxsize=4)(registry.ready)
+_loaded, _control = lru_cache(maxsize=4)(registry.ready), lru_cache(maxsize=4)(registry.control_name)
 
 
 class IsolatedIntegrator:
@@ -383,6 +389,7 @@ class MeasuredMotion:
     outcome: of its run; "" where the true motion is unknown, so that nothing is measured.  error: infinite for a run
     that did not reach its horizon.  amplification: of the motion.  turns: its rate times the horizon.
     other: the error of the integrator that it is compared with, None without one.  reason: why the run was aborted.
+    steps: of the default length, to the horizon.  order: of a method with fixed steps; 0 of others.
     """
 
     motion: Motion
@@ -392,10 +399,18 @@ class MeasuredMotion:
     turns: float
     other: float | None = None
     reason: str = ""
+    steps: float = 0.0
+    order: int = 0
 
-    def explained(self, eps: float) -> float:
+    def rounding(self, eps: float) -> float:
         """The error of a stable method that makes an error of eps in each radian: eps · amplification · √turns."""
         return eps * self.amplification * math.sqrt(1 + self.turns)
+
+    def explained(self, eps: float) -> float:
+        """That error; of a method with fixed steps one of eps in each step, and of (rate h)^order in each radian."""
+        if not self.order:
+            return self.rounding(eps)
+        return self.amplification * (eps * self.steps + self.turns * (self.turns / self.steps) ** self.order)
 
 
 class Meter:
@@ -410,6 +425,7 @@ class Meter:
         python = is_third_party(integrator.name) and not isinstance(integrator.source, Command)
         self._shift = Fraction(1, 2 ** (precision.bits + _MORE_BITS))
         self._isolated = IsolatedIntegrator(integrator) if python else None
+        self._order = 0
 
     def close(self) -> None:
         """End the process of a third-party integrator."""
@@ -428,6 +444,7 @@ class Meter:
         rates = [rate(problem.system, problem.parameters, problem.start.flat) for problem in problems]
         references = self._references(problems, rates)
         runs = self._runs(self.integrator, problems, motions)
+        self._order = max(self._order, *(run.order for run in runs))  # a failed run has none
         others = [] if self.against is None else self._runs(self.against, problems, motions)
         measured = []
         for i, (motion, unit, (true, growth), run) in enumerate(zip(motions, rates, references, runs, strict=True)):
@@ -438,7 +455,8 @@ class Meter:
             error = _error(run, true, unit)
             outcome = Outcome.NON_FINITE.value if math.isinf(error) and not _failed(run) else run.outcome
             other = _error(others[i], true, unit) if others else None
-            measured.append(MeasuredMotion(motion, outcome, error, growth, turns, other, run.reason))
+            how = run.reason, float(abs(self.horizon) / DEFAULT_STEP), self._order
+            measured.append(MeasuredMotion(motion, outcome, error, growth, turns, other, *how))
         return measured
 
     def run_of(self, integrator: Integrator, motion: Motion) -> IntegratedRun:

@@ -10,7 +10,7 @@ from functools import partial
 from itertools import product
 from pathlib import Path
 from statistics import median, quantiles
-from time import process_time
+from time import perf_counter
 from typing import Any
 
 import msgspec
@@ -333,6 +333,12 @@ class Hunted:
     lost: int
     proofs: tuple[Proof, ...] = ()
 
+    @property
+    def law_text(self) -> str:
+        """The law of the errors of this integrator."""
+        fixed = any(m.order for m in self.worst)
+        return f"{self.law:.2g} A (eps T/h + rate T (rate h)^order)" if fixed else f"{self.law:.2g} eps A √(1 + rate T)"
+
 
 def hunt(request: HuntRequest, advance: Advance | None = None) -> Hunted:
     """Search, and shrink the findings.
@@ -386,9 +392,9 @@ class _Hunt:
         request = self.request
         self.meter.measure([self._drawn(0)] * 2)  # compilation takes no time of a motion
         motions = list(map(self._drawn, range(FIRST)))[: request.budget]
-        began = process_time()
+        began = perf_counter()
         first = self.meter.measure(motions)
-        cost = max(process_time() - began, 1e-6) / len(motions)
+        cost = max(perf_counter() - began, 1e-6) / len(motions)
         budget = request.budget
         if budget is None:
             assert request.seconds is not None
@@ -422,7 +428,7 @@ class _Hunt:
                 self.hits.append(sharp)
 
     def _is_lost(self, m: MeasuredMotion) -> bool:
-        return m.explained(self.eps) * max(self.law, 1.0) > _LOST
+        return m.rounding(self.eps) * max(self.law, 1.0) > _LOST
 
     def _score(self, m: MeasuredMotion) -> float:
         """The measure that the search increases: the error over the expected one, or over that of ``against``."""
@@ -441,7 +447,8 @@ class _Hunt:
         if not m.outcome:
             return False
         if math.isinf(m.error):
-            return m.other is None or not math.isinf(m.other)
+            too_long = m.order and m.turns > m.steps  # a step of more than a radian may be unstable
+            return not too_long and (m.other is None or not math.isinf(m.other))
         limit = self.request.limit
         if self.request.against is not None:
             return not self._is_lost(m) and m.error > (limit or DECADES) * self._compared_error(m)

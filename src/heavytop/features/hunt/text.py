@@ -58,7 +58,7 @@ def _nothing(hunted: Hunted) -> list[str]:
     elif request.limit is not None:
         beyond = f"an error of {request.limit:.3g} eps T^1.5"
     else:
-        law = f"{hunted.law:.2g} eps A √(1 + rate T), which bounds nine tenths of random tops"
+        law = f"{hunted.law_text}, which bounds nine tenths of random tops"
         beyond = f"an error two decades above the expected one: {law}; A is the amplification of the motion"
     lines = [fill(f"No run failed, and none has {beyond}.", _WIDTH)]
     if hunted.worst:
