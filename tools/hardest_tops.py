@@ -8,7 +8,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 import heavytop as ht
-from heavytop.features.hunt.text import law_text, worst_lines
+from heavytop.features.hunt.text import worst_lines
 from heavytop.precision import shown
 
 HUNTS = (("heyoka", 2000, 100), ("multiword", 500, 100), ("scipy:DOP853", 200, 20), ("splitting:4", 200, 20))
@@ -39,11 +39,11 @@ def part(name: str, budget: int, horizon: int) -> str:
     a = hunt.hunted
     lines = [f"\n## {name}", "```text", f"$ {hunt.again}", "```"]
     counts = f"{a.motions} motions to T = {shown(Fraction(horizon))}; {a.lost} lose all digits in any double. "
-    lines.append(f"{counts}Its law: {law_text(a)}.")
+    lines.append(f"{counts}Its law: {a.law_text}, which bounds nine tenths of random tops (A: amplification).")
     if hunt.found:
         lines += ["", "**Found**, beyond what that explains:", "", "```text", str(hunt), "```"]
     else:
-        worst = "The worst:" if a.worst else "The largest errors are of motions that lose all digits in any double."
+        worst = "The nearest to it:" if a.worst else "All motions tried lose all digits in any double."
         lines += ["", f"Nothing is beyond two decades of that. {worst}", *[""] * bool(a.worst)]
         pairs = zip(worst_lines(a), a.worst, strict=True)
         lines += [f"- {text} `{data(m.motion)}`" for text, m in pairs]

@@ -109,7 +109,7 @@ def law_row(growth: str, integrator: str = "mine:rk4", **laws: str) -> Row:
         ("t^1.5", "grows like t^1.5: rounding noise alone, the smallest possible."),
         ("t", "grows like t: a constant frequency error, from truncation or a wrong coefficient."),
         ("bounded", "is bounded."),
-        ("unresolved", "follows no single law, over the last decade of t like t^1.7."),
+        ("unresolved", "shows no law over three decades of t; over the last decade it is like t^1.7."),
     ],
 )
 def test_the_law_of_an_integrator_of_others_is_said_with_what_it_means(growth: str, words: str) -> None:

@@ -76,7 +76,7 @@ def test_a_fault_of_heavy_gyrostats_is_found_shrunk_and_kept(monkeypatch: pytest
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("integrator", "horizon", "law"), [("heyoka", 4, "eps √(1 + rate T)"), ("splitting:4", 20, "(rate h)^order")]
+    ("integrator", "horizon", "law"), [("heyoka", 4, "eps A √(1 + rate T)"), ("splitting:4", 20, "(rate h)^order")]
 )
 def test_a_healthy_integrator_has_none_and_says_what_explains_its_worst(integrator, horizon: int, law: str) -> None:
     hunt = ht.hunt(integrator, budget=96, horizon=horizon, seed=3)

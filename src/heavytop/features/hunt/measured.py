@@ -380,6 +380,8 @@ _DIRECTION = tuple(Fraction(n, 1000) for n in (427, -331, 373, 461, -397, 433))
 """The direction of the second start: nearly a unit vector, in no plane of symmetry of a body."""
 _STEP_LIMIT = 1_000_000
 _LEAST = 1e-300
+ROUNDINGS = 20
+"""Roundings of a fixed step, all in one direction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -407,10 +409,12 @@ class MeasuredMotion:
         return eps * self.amplification * math.sqrt(1 + self.turns)
 
     def explained(self, eps: float) -> float:
-        """That error; of a method with fixed steps one of eps in each step, and of (rate h)^order in each radian."""
+        """That error; of a method with fixed steps one of 20 eps in each step, and of (rate h)^order in each radian."""
         if not self.order:
             return self.rounding(eps)
-        return self.amplification * (eps * self.steps + self.turns * (self.turns / self.steps) ** self.order)
+        return self.amplification * (
+            ROUNDINGS * eps * self.steps + self.turns * (self.turns / self.steps) ** self.order
+        )
 
 
 class Meter:

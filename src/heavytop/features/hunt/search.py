@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -21,6 +22,7 @@ from heavytop.errors import InputError, invalid, refusal
 from heavytop.exact.flint.balls import rational, whole_evaluation, working_precision
 from heavytop.features.hunt.measured import (
     FAMILIES,
+    ROUNDINGS,
     Dice,
     Family,
     IntegratedRun,
@@ -251,6 +253,7 @@ _MOST_FOUND = 3
 _MOST_HITS = 16
 _SHOWN = 3
 _SHARPENED = 6
+"""Motions of one class whose amplification is computed over all directions, to show one that is not lost."""
 _LEAST_LAW = 0.05
 _LOST = 0.01
 """Where an error of this size would be explained, the format has lost all significant digits."""
@@ -314,7 +317,7 @@ class HuntRequest:
 
 @dataclass(frozen=True, slots=True)
 class Hunted:
-    """The result of a search: the findings, shrunk and worst first; the worst motions that are explained.
+    """The result of a search: the findings, shrunk and worst first; of each class the motion nearest to a finding.
 
     motions: how many were tried, of ``planned``.
     law: the error over eps, amplification and √turns that nine tenths of the random tops stay below.
@@ -337,7 +340,8 @@ class Hunted:
     def law_text(self) -> str:
         """The law of the errors of this integrator."""
         fixed = any(m.order for m in self.worst)
-        return f"{self.law:.2g} A (eps T/h + rate T (rate h)^order)" if fixed else f"{self.law:.2g} eps A √(1 + rate T)"
+        truncation = f"({ROUNDINGS} eps T/h + rate T (rate h)^order)"
+        return f"{self.law:.2g} A {truncation}" if fixed else f"{self.law:.2g} eps A √(1 + rate T)"
 
 
 def hunt(request: HuntRequest, advance: Advance | None = None) -> Hunted:
@@ -444,12 +448,12 @@ class _Hunt:
 
     def exceeds(self, m: MeasuredMotion) -> bool:
         """Whether the motion is a finding."""
-        if not m.outcome:
+        limit = self.request.limit
+        too_long = m.order and m.turns > m.steps  # a step of more than a radian may be unstable
+        if not m.outcome or (too_long and limit is None and self.request.against is None):
             return False
         if math.isinf(m.error):
-            too_long = m.order and m.turns > m.steps  # a step of more than a radian may be unstable
-            return not too_long and (m.other is None or not math.isinf(m.other))
-        limit = self.request.limit
+            return m.other is None or not math.isinf(m.other)
         if self.request.against is not None:
             return not self._is_lost(m) and m.error > (limit or DECADES) * self._compared_error(m)
         if limit is not None:
@@ -492,15 +496,21 @@ class _Hunt:
 
     def _result(self, done: int, motions: list[MeasuredMotion]) -> Hunted:
         good = [m for m in self.measured if m.outcome == "success" and not self._is_lost(m)]
-        ordered = sorted(good, key=lambda m: m.error, reverse=True)
-        sharp = map(self.meter.sharper, list({m.motion: m for m in ordered[:_POOL]}.values())[:_SHARPENED])
-        worst = [m for m in sharp if not self._is_lost(m)][:_SHOWN]
+        worst, sharpened = dict[str, MeasuredMotion](), Counter[str]()
+        for m in sorted(good, key=self._score, reverse=True):
+            if len(worst) == _SHOWN:
+                break
+            if (kind := class_of(*m.motion)) not in worst and sharpened[kind] < _SHARPENED:
+                sharpened[kind] += 1
+                if not self._is_lost(sharp := self.meter.sharper(m)):
+                    worst[kind] = sharp
+        nearest = sorted(worst.values(), key=self._score, reverse=True)
         middle = median(m.error for m in self.plain) if self.plain else math.inf
         unknown = sum(not m.outcome for m in self.measured)
         lost = sum(bool(m.outcome) and self._is_lost(m) for m in self.measured)
         proofs = tuple(proof(self.meter, m, self.request.other) for m in motions)
         return Hunted(
-            self.request, tuple(motions), tuple(worst), done, self.planned, self.law, middle, unknown, lost, proofs
+            self.request, tuple(motions), tuple(nearest), done, self.planned, self.law, middle, unknown, lost, proofs
         )
 
 

@@ -62,7 +62,7 @@ def _nothing(hunted: Hunted) -> list[str]:
         beyond = f"an error two decades above the expected one: {law}; A is the amplification of the motion"
     lines = [fill(f"No run failed, and none has {beyond}.", _WIDTH)]
     if hunted.worst:
-        lines += ["The worst:", *_folded(worst_lines(hunted))]
+        lines += ["The nearest to that:", *_folded(worst_lines(hunted))]
     return lines
 
 

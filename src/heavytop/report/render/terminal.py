@@ -248,8 +248,10 @@ def _meaning(row: Row) -> str:
     name = Quantity(SOLUTION_ERROR, "along").text
     law = row.laws.get(name)
     growth = "unresolved" if law is None else law.growth
+    fitted = law is not None and law.exponent is not None
+    no_law = "follows no single law" if fitted else "shows no law over three decades of t"
     grows = {
-        "unresolved": f"follows no single law{_recent_power(row.series.get(name))}",
+        "unresolved": f"{no_law}{_recent_power(row.series.get(name))}",
         "bounded": "is bounded",
         "exponential": "grows exponentially",
     }.get(growth, f"grows like {growth}")
@@ -272,7 +274,7 @@ def _recent_power(series: Series | None) -> str:
         return ""
     end = max(curve)
     begin = min(curve, key=lambda time: abs(end - 1 - time))
-    return f", over the last decade of t like t^{(curve[end] - curve[begin]) / (end - begin):z.1f}"
+    return f"; over the last decade it is like t^{(curve[end] - curve[begin]) / (end - begin):z.1f}"
 
 
 def _law_names(growths: Iterable[str], width: int) -> str:
