@@ -15,7 +15,7 @@ HUNTS = (("heyoka", 2000, 100), ("multiword", 500, 100), ("scipy:DOP853", 200, 2
 HEAD = """# The hardest tops
 What `heavytop hunt` finds for four integrators in double, made by
 [`tools/hardest_tops.py`](../tools/hardest_tops.py); the command above each part searches the same again.
-How a hunt searches, and what counts as explained, is in [hunt.md](../docs/hunt.md).
+How a hunt searches, and what error is expected, is in [hunt.md](../docs/hunt.md).
 """
 
 
