@@ -313,6 +313,8 @@ def test_arrays_of_numpy_are_a_table(tmp_path: Path) -> None:
         {"t": TIMES, "q": scalar_last(), "quaternion_order": "xyzw", **comments, **texts},
         {"t": TIMES, "quaternions": scalar_last(), "quaternion_order": "scalar last", **comments, **texts},
         {"time": TIMES, "R": run().matrices(), **whole},
+        {"time": TIMES, "qpos": quaternions(), "qvel": omegas(), "joint": "ball", **whole},
+        {"time": TIMES, "root_quat_xyzw": scalar_last(), **whole},
     ):
         numpy.savez(path, **arrays)
         assert digits(path) > 13
@@ -455,6 +457,7 @@ def test_rows_of_one_time_are_one_where_they_agree_to_the_digits_printed(tmp_pat
         ("t,b.Q[1],b.Q[2],b.Q[3],b.Q[4]", "'b.Q[1]' looks like an attitude"),
         ("t,y[0],y[1],y[2],y[3]", "'y[0]' and 'y[1]' name no quantity"),
         ("t,rx,ry,rz,n", "# attitude: rotation vector"),
+        ("t,rpy1,rpy2,rpy3,n", "'rpy1' looks like an attitude"),
         ("t,angular rate 1,angular rate 2,angular rate 3,n", "looks like an angular velocity"),
         ("t,gx,gy,gz,n", "Ω of a gyroscope, or γ"),
         ("t,cmd_orientation_w,cmd_orientation_x,cmd_orientation_y,cmd_orientation_z", "not found"),

@@ -65,7 +65,7 @@ _INDEX = re.compile(r"(qpos|qvel)[\[_(.]?(\d+)[\])]?", re.IGNORECASE)
 _DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
 _LOOKS = {
     "an attitude": re.compile(
-        r"quat|orient|attitude|(^|[^a-z])att[^a-z]|[._]q[\[(]\d|rodrigues|gibbs|euler|dcm|(rot|angle|theta)_?[xyz]$",
+        r"quat|orient|attitude|(^|[^a-z])att[^a-z]|[._]q[\[(]\d|rodrigues|gibbs|euler|dcm|rpy|ypr|(rot|angle|theta)_?[xyz]$",
         re.I,
     ),
     "an angular velocity": re.compile(
@@ -517,7 +517,6 @@ def _columns_of(table: Any) -> dict[str, Any]:
 
 _TIMES = ("t", "time", "times", *_EPOCHS)
 _WIDE = {
-    "quaternion": ("qw", "qx", "qy", "qz"),
     "matrix": tuple(f"R{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)),
     "omega": ("omega1", "omega2", "omega3"),
     "state": ("omega1", "omega2", "omega3", "gamma1", "gamma2", "gamma3"),
@@ -535,8 +534,11 @@ _ARRAYS = {
 def _names_of(name: str, width: int, scalar_last: bool) -> list[str]:
     """The names of the columns of one array."""
     base = _ARRAYS.get(name.lower(), name)
-    if base == "quaternion" and width == 4 and scalar_last:
-        return ["qx", "qy", "qz", "qw"]
+    order = name.lower()[-4:] if name.lower().endswith(("wxyz", "xyzw")) else "xyzw" if scalar_last else "wxyz"
+    if width == 4 and (base == "quaternion" or name.lower().endswith(order)):
+        return [f"q{axis}" for axis in order]
+    if name.lower() in ("qpos", "qvel"):
+        return [f"{name}[{i}]" for i in range(width)]
     if len(_WIDE.get(base, ())) == width:
         return list(_WIDE[base])
     if width == 1:
