@@ -56,10 +56,10 @@ def test_the_digits_of_each_motion_and_format_stand_in_a_table() -> None:
 
 
 def test_what_failed_is_named_and_counted() -> None:
-    rows = [row(case=f"top-{i}", outcome="step_limit", time_reached="7.5", metrics={}) for i in range(9)]
-    lines = said(*rows)
+    ended = {"outcome": "step_limit", "time_reached": f"0.{'0' * 65}75", "horizon": f"0.{'0' * 64}1", "metrics": {}}
+    lines = said(*(row(case=f"top-{i}", **ended) for i in range(9)))
     assert lines[0] == "Plan p: 9 measurements, 9 failed:"
-    assert lines[1] == "  top-0 in double: step_limit at t = 7.5 of 100"
+    assert lines[1] == "  top-0 in double: step_limit at t = 7.5e-66 of 1e-65"
     assert lines[3] == "  and 7 more"
 
 

@@ -19,7 +19,7 @@ from heavytop.display import plural, printable
 from heavytop.measure.scalar import digits_kept, digits_text
 from heavytop.measure.scorer import DRIFT
 from heavytop.records import FAILED, NOT_ASKED, OUT_OF_TIME, UNMEASURED, UNSUPPORTED, Metric, Row
-from heavytop.report.document.document import Cell, Value, Word, cell_text, computed_by
+from heavytop.report.document.document import Cell, Value, Word, cell_text, computed_by, short
 from heavytop.report.document.kind import Kinds, kind_of
 
 if TYPE_CHECKING:
@@ -62,7 +62,8 @@ def failure(row: Row) -> str:
         return f"  {row.key.kind}: {row.reference.reason} in {row.precision}"
     if row.outcome in UNMEASURED:
         return f"  {row.key.kind} of {row.case}, {row.integrator} in {row.precision}: {row.outcome}, {row.against}"
-    return f"  {row.case} in {row.precision}: {row.outcome} at t = {row.time_reached} of {row.horizon}"
+    reached, horizon = short(row.time_reached), short(row.horizon)
+    return f"  {row.case} in {row.precision}: {row.outcome} at t = {reached} of {horizon}"
 
 
 def head(report: AnyReport, rows: int) -> Text:
