@@ -35,7 +35,6 @@ from heavytop.features.claims.algebra.prover import shortest
 from heavytop.features.claims.algebra.rational import forces_zero
 from heavytop.features.claims.algebra.reader import Formula, parse, symbol
 from heavytop.features.claims.algebra.ring import Unprovable, where_provable
-from heavytop.features.claims.algebra.signs import PLUS
 from heavytop.features.claims.algebra.statement import (
     AFTER,
     ALL,
@@ -227,9 +226,6 @@ class UserComponent(UserIntegral):
     @where_provable(False)
     def _has_sign_of(self, radicand: sympy.Expr, f: sympy.Expr) -> bool:
         """Whether f(u) > 0, with the signs of its factors, implies that an expression is >= 0."""
-        cofactor = _cofactor(radicand, f)
-        if cofactor.is_rational_function(self._u) and _is_square(cofactor):
-            return True
         field = Field(self.setting.assumptions(0, facts=(f, *self._signed_factors(f))), [radicand])
         return field.tower.sign(field.enter(radicand)).value > 0
 
@@ -505,12 +501,6 @@ class UserComponent(UserIntegral):
 def _cofactor(p: sympy.Expr, f: sympy.Expr) -> sympy.Expr:
     """f/p without their common factors."""
     return sympy.factor(f) / sympy.factor(p)
-
-
-def _is_square(e: sympy.Expr) -> bool:
-    """Whether it is a positive expression times the square of a rational function."""
-    factors = sympy.Mul.make_args(sympy.factor(sympy.numer(e) * sympy.denom(e)))
-    return all(factor.as_base_exp()[1].is_even or sign_of(factor) == PLUS for factor in factors)
 
 
 def _is_at(state: Mapping[sympy.Symbol, Fraction], zeros: Iterable[sympy.Expr]) -> bool:
