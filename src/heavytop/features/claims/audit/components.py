@@ -253,7 +253,12 @@ class UserComponent(UserIntegral):
         yield in_u, replace(base, samples=tuple(filter(self._is_on_conditions, moving)))
         yield squares, replace(states, samples=tuple(s for s in states.samples if self._moves(system, s)))
         yield [s for s in on_state if s.equation != "reduced"], self.at_states
-        yield self._in_time(system), setting_of(self.context, TIME)
+        in_time, at_times = self._in_time(system), setting_of(self.context, TIME)
+        second = [
+            s for s in in_time if (s.equation, s.component) == ("component", 2) and len(moving) < len(base.samples)
+        ]
+        yield [s for s in in_time if s not in second], at_times
+        yield second, replace(at_times, samples=tuple(moving))
 
     def audit(self, about: System, progress: Progress = silent) -> Audit:
         """The audit as a claim about a system, with the values at the start of its own first integrals."""
