@@ -338,11 +338,16 @@ class Region:
         try:
             obstacle = self.regularity.obstacle(self.field.enter(value))
         except Unprovable as error:
-            obstacle = error.cause
+            return error.cause
         is_power = value.is_Pow and value.exp.is_Integer
         parts = value.args if value.is_Add or value.is_Mul else value.args[: int(is_power)]
-        is_finite = not is_power or value.exp > 0 or self.discharge(Need(ConditionKind.NONZERO, value.base))
-        return obstacle and (self.obstacle(parts) if parts and is_finite else obstacle)
+        if (
+            obstacle
+            and parts
+            and (not is_power or value.exp > 0 or self.discharge(Need(ConditionKind.NONZERO, value.base)))
+        ):
+            return self.obstacle(parts)
+        return obstacle
 
     def divisors(self, *, forced: bool) -> Iterator[str]:
         """Divisors of the algebra that may be 0 on an open part of the region; forced: at any point of it."""
