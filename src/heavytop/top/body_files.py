@@ -782,10 +782,8 @@ def _of_axes(x: Sequence[Fraction], y: Sequence[Fraction]) -> Tensor:
     return _rotation(Attitude.matrix(transposed(columns), normalize=True))
 
 
-_USD_NAMES = (
-    *("mass", "centerOfMass", "diagonalInertia", "principalAxes", "gravityMagnitude", "gravityDirection"),
-    "disableGravity",
-)
+_PHYSICS = ("mass", "centerOfMass", "diagonalInertia", "principalAxes", "gravityMagnitude", "gravityDirection")
+_USD_NAMES = (*_PHYSICS, "disableGravity")
 _STAGE = {"metersPerUnit": "0.01", "kilogramsPerUnit": "1", "upAxis": "Z"}
 _TOKEN = re.compile(
     r'(?:(def|over|class)\s+(?:\w+\s+)?"([^"]*)")'
@@ -886,7 +884,7 @@ def composed_usd(path: Path) -> Iterator[Link]:
         units["upAxis"] = UsdGeom.GetStageUpAxis(stage)
     prims = []
     for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
-        attributes = {name: prim.GetAttribute(f"physics:{name}") for name in _USD_NAMES[:-1]}
+        attributes = {name: prim.GetAttribute(f"physics:{name}") for name in _PHYSICS}
         attributes["disableGravity"] = prim.GetAttribute("physxRigidBody:disableGravity")
         first = {name: attribute.Get(Usd.TimeCode.EarliestTime()) for name, attribute in attributes.items()}
         values = {name: _printed(value) for name, value in first.items() if attributes[name].HasAuthoredValue()}
