@@ -182,10 +182,15 @@ def judge_seconds(old: float, new: float, timings: Timings) -> Judged:
     if not (math.isfinite(old) and math.isfinite(new)):
         return Verdict.INCOMPARABLE, "no finite time"
     ratio = max(new, timings.floor) / max(old, timings.floor)
-    slower, faster = (f"{a / b:.2g} times" if b else "many times" for a, b in ((new, old), (old, new)))
+    slower, faster = (_times(a / b) if b else "many times" for a, b in ((new, old), (old, new)))
     if ratio > timings.ratio:
         return Verdict.WORSE, f"{slower} as long"
     return (Verdict.BETTER, f"{faster} as fast") if ratio * timings.ratio < 1 else SAME
+
+
+def _times(ratio: float) -> str:
+    """``2.1 times``, ``295 times``: no exponent."""
+    return f"{ratio:.3g} times" if ratio < 1000 else f"{ratio:.0f} times"
 
 
 # Comparison of the seconds of repeated runs on one machine.
@@ -233,8 +238,8 @@ def _seconds_verdict(old: float, new: float, allowed: float, known: str) -> Judg
     if abs(grown) <= allowed:
         return SAME
     if grown > 0:
-        return Verdict.WORSE, f"{known}{10**grown:.3g} times as long; {10**allowed:.2g} is allowed"
-    return Verdict.BETTER, f"{known}{10**-grown:.3g} times as fast; {10**allowed:.2g} is allowed"
+        return Verdict.WORSE, f"{known}{_times(10**grown)} as long; {10**allowed:.2g} is allowed"
+    return Verdict.BETTER, f"{known}{_times(10**-grown)} as fast; {10**allowed:.2g} is allowed"
 
 
 # Outcomes: the comparison of two rows of which at least one did not reach its horizon.
