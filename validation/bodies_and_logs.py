@@ -311,7 +311,7 @@ def packages(seed: int) -> int:
             other = body_files.by_mujoco(path, "arm", 0) if suffix == "xml" else read_body(by_usd(path, suffix))
             count += 1
             pairs = zip((own.mass, *own.centre, *own.six), (other.mass, *other.centre, *other.six), strict=True)
-            error = max(abs(float(a - b)) for a, b in pairs) / max(map(float, own.six))
+            error = max(abs(float((a - b) / (abs(a) + max(own.six)))) for a, b in pairs)
             if error > (1e-12 if suffix == "xml" else 1e-5) or own.joint != other.joint:
                 wrong += 1
                 print(f"{error:.1e}, {own.joint}, {other.joint}: {content}")
