@@ -176,7 +176,7 @@ def test_the_fastest_run_counts_since_other_work_only_adds() -> None:
 def test_seconds_below_the_floor_are_equal_and_the_ratio_said_is_theirs() -> None:
     floor = {"timings": Timings("always", ratio=2, floor=0.01)}
     assert judged(PLAIN | {"least": 0.009}, PLAIN | {"least": 0.001}, **floor) == ("same", "")
-    slow = judged(PLAIN | {"least": 29.5}, PLAIN | {"least": 0.001}, **floor)
+    slow = judged(PLAIN | {"least": 2.95}, PLAIN | {"least": 0.001}, **floor)
     assert slow == ("worse", "seconds run: 2950 times as long")
 
 
