@@ -9,6 +9,7 @@ import sympy
 
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Assumptions, Field
+from heavytop.features.claims.algebra.ring import Unprovable
 
 T, A, B = sympy.Symbol("t", real=True), sympy.Symbol("a", positive=True), sympy.Symbol("b", positive=True)
 TRUE = [
@@ -35,6 +36,17 @@ def test_a_true_identity_is_proven_and_a_disturbed_one_is_not(identity):
     assert field(identity).is_zero(identity)
     for disturbance in (sympy.Rational(1, 10**40), T * sympy.Rational(1, 10**40), A - B):
         assert not field(identity + disturbance).is_zero(identity + disturbance)
+
+
+@pytest.mark.parametrize("function", [sympy.sin, sympy.exp])
+def test_a_full_field_takes_no_further_function_for_one_that_it_holds(function):
+    full = field(T)
+    for argument in [sympy.Symbol(f"a{n}", real=True) * T for n in range(40)] * 2:
+        try:
+            full.enter(function(argument))
+        except Unprovable:
+            continue
+        assert argument.has(*(sympy.Symbol(f"a{n}", real=True) for n in range(20)))
 
 
 def test_the_root_of_a_square_takes_the_sign_of_the_domain():

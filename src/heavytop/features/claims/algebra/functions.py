@@ -147,7 +147,7 @@ class Transcendental:
         make: adds the generator of a new base, the argument over the divisor known so far.
         """
         for position, (known_kind, base, index) in enumerate(self._bases):
-            if kind == known_kind:
+            if kind == known_kind and index >= 0:  # a base whose generator could not be added has none
                 value = self._tower.ratio(argument, base)
                 if value is not None:
                     if value.denominator > 1:
