@@ -1,6 +1,7 @@
 """The exact algebra proves true identities, never a false one."""
 
 import random
+from contextlib import suppress
 from fractions import Fraction
 from itertools import permutations
 
@@ -38,15 +39,12 @@ def test_a_true_identity_is_proven_and_a_disturbed_one_is_not(identity):
         assert not field(identity + disturbance).is_zero(identity + disturbance)
 
 
-@pytest.mark.parametrize("function", [sympy.sin, sympy.exp])
-def test_a_full_field_takes_no_further_function_for_one_that_it_holds(function):
-    full = field(T)
+def test_a_full_field_takes_no_further_function_for_one_that_it_holds():
+    full, entered = field(T), {}
     for argument in [sympy.Symbol(f"a{n}", real=True) * T for n in range(40)] * 2:
-        try:
-            full.enter(function(argument))
-        except Unprovable:
-            continue
-        assert argument.has(*(sympy.Symbol(f"a{n}", real=True) for n in range(20)))
+        with suppress(Unprovable):
+            entered[argument] = str(full.enter(sympy.sin(argument)))
+    assert len(set(entered.values())) == len(entered) < 40
 
 
 def test_the_root_of_a_square_takes_the_sign_of_the_domain():
