@@ -41,8 +41,8 @@ _MANY, _CLOSE = 256, 200
 """States at so many times, with at most so many steps between two of them, are computed on a grid by heyoka."""
 _AT_ONCE = {"double": 500_000, "extended": 100_000, "quad": 10_000}
 """The most steps of a run that cannot be interrupted: about a second."""
-_SHORT = 0.97
-"""The part of the way to a sample that is taken in steps of the mean length."""
+_SHORT, _FEW = 0.97, 100
+"""The part of the way to a sample that is taken in steps of the mean length, where more than so many steps are left."""
 _GROWTH = 16
 """At most so many times the steps so far are taken at once: few steps say little about the longest."""
 _SLOWEST, _FASTEST, _SLOW, _FAST = Fraction(1, 2**48), Fraction(2) ** 55, 2.0**-46, 2.0**52
@@ -388,15 +388,17 @@ def _in_strides(engine: Any, targets: Sequence[Any], most: int, end: Any) -> tup
     for target in targets:
         goal = target, 0.0
         while not reached(now := engine.dtime, goal):
-            left, state = abs(float(target - now[0])), engine.state.copy()
-            shortest = min(longest, abs(float(now[0])) / (_SHORT * steps)) if even and steps else longest
-            count = int(left / shortest) - 1 if steps else 1
-            if count < 2:
+            left = abs(float(target - now[0]))
+            count = left / longest if steps else 1
+            if by_mean := even and count > _FEW and steps > _FEW:
+                count = _SHORT * left * steps / abs(float(now[0]))
+            if count < 3:
                 (outcome, length), done = step(True), 1  # write_tc
             else:
-                outcome, _, length, done, *_ = engine.propagate_until(end, max_steps=count)
+                state = engine.state.copy()
+                outcome, _, length, done, _, _ = engine.propagate_until(end, max_steps=int(count))
                 if reached(engine.dtime, goal):
-                    engine.state[:], engine.dtime, longest, even = state, now, 1.5 * longest, False
+                    engine.state[:], engine.dtime, longest, even = state, now, 1.5 * longest, not by_mean
                     continue
             steps, longest = steps + done, max(longest, abs(float(length)))
             if steps > most or outcome == failed:
