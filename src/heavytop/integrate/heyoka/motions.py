@@ -269,6 +269,8 @@ def integrate_to_samples(
             flags={**run.flags, "unit": f"2^{unit.numerator.bit_length() - unit.denominator.bit_length()}"},
         )
     began = perf_counter()
+    if problem.precision.family == "double":
+        targets = list(map(float, targets))  # as far() is
     if stepping is Stepper and all(option is None for option in (between, place, mark)):
         at_once = _at_once(engine, lambda: load(engine, problem), targets, step_limit, problem.precision)
         if at_once is not None:
@@ -282,8 +284,6 @@ def integrate_to_samples(
             seconds = perf_counter() - began
             return _trajectory(tool, problem, stepper, rounded_times, states, Outcome.SUCCESS, seconds)
     load(engine, problem)
-    if problem.precision.family == "double":
-        targets = list(map(float, targets))  # as far() is
     forwards = bool(targets[-1] >= 0)
     stepper = stepping(engine, forwards, step_limit, far(forwards, problem.precision), between)
     ended = sampled(stepper, targets, tool.flags, perf_counter(), observer, place, mark)
