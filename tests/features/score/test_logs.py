@@ -314,7 +314,7 @@ def test_arrays_of_numpy_are_a_table(tmp_path: Path) -> None:
         {"t": TIMES, "quaternions": scalar_last(), "quaternion_order": "scalar last", **comments, **texts},
         {"time": TIMES, "R": run().matrices(), **whole},
         {"time": TIMES, "qpos": quaternions(), "qvel": omegas(), "joint": "ball", **whole},
-        {"time": TIMES, "root_quat_xyzw": scalar_last(), **whole},
+        {"time": TIMES, "root_quat_xyzw": scalar_last(), "target_quat_wxyz": scalar_last(), **whole},
     ):
         numpy.savez(path, **arrays)
         assert digits(path) > 13

@@ -239,7 +239,10 @@ def test_a_sleeping_top_is_right_in_any_columns(tmp_path: Path) -> None:
         ),
         ({"header": "t,a,b,c,d"}, "'a' to 'd' look like an attitude"),
         ({"header": "t,psi,theta,phi,n", "sequence": "ZXZ"}, "ψ, θ, φ do not say which angle of ZXZ is the first"),
-        ({"header": "t,phi,theta,psi,n", "sequence": "ZYX"}, "φ, θ, ψ do not say which angle of ZYX is the first"),
+        (
+            {"header": "t,phi,theta,psi,wx,wy,wz,gx,gy,gz", "sequence": "ZYX", "rows": "1,0,0,3,0,0,3,0,0,1"},
+            "φ, θ, ψ do not say which angle of ZYX is the first",
+        ),
         ({"header": "t,euler1,euler2,euler3", "rows": "1,0,0,3"}, "Euler angles have no sequence"),
         ({"rows": "1,0.5,0,0,abc"}, "Line 7, column qz: 'abc' is not a finite number"),
         ({"rows": "1,1,0,0,0\n2,0.5,,0,0"}, "Line 8, column qx is empty"),

@@ -498,8 +498,8 @@ def _of_table(document: Mapping[str, Any], convention: Convention) -> ColumnTabl
         try:
             ordered = ordered_places(quantity, components, last, convention.sequence)
         except InputError:
-            if both and quantity not in ("omega", "gamma"):
-                continue  # a column of some other thing, beside a whole state
+            if both and quantity not in ("omega", "gamma") and len(components) != WIDTHS.get(quantity, 3):
+                continue  # columns of some other thing, beside a whole state
             raise
         name = quantity
         if quantity == "framed" or (quantity == "omega" and "framed" not in header.places):

@@ -198,10 +198,10 @@ def _numbers(key: str, text: str) -> list[str]:
 
 
 def _incomplete(header: observed_columns.Header) -> list[int]:
-    """Indices of quantities with a missing component, which are not read if Ω and γ are complete."""
+    """Indices of quantities with a missing or further component, which are not read if Ω and γ are complete."""
     if not {"omega", "gamma"} <= header.places.keys():
         return []
-    incomplete = (indices for name, indices in header.places.items() if len(indices) < WIDTHS.get(name, 3))
+    incomplete = (indices for name, indices in header.places.items() if len(indices) != WIDTHS.get(name, 3))
     return [index for indices in incomplete for index in indices.values()]
 
 

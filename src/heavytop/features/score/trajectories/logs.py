@@ -534,9 +534,10 @@ _ARRAYS = {
 def _names_of(name: str, width: int, scalar_last: bool) -> list[str]:
     """The names of the columns of one array."""
     base = _ARRAYS.get(name.lower(), name)
-    order = name.lower()[-4:] if name.lower().endswith(("wxyz", "xyzw")) else "xyzw" if scalar_last else "wxyz"
-    if width == 4 and (base == "quaternion" or name.lower().endswith(order)):
-        return [f"q{axis}" for axis in order]
+    if width == 4 and name.lower().endswith(("wxyz", "xyzw")):
+        return [f"{name[:-4]}{axis}" for axis in name[-4:].lower()]
+    if width == 4 and base == "quaternion":
+        return [f"q{axis}" for axis in ("xyzw" if scalar_last else "wxyz")]
     if name.lower() in ("qpos", "qvel"):
         return [f"{name}[{i}]" for i in range(width)]
     if len(_WIDE.get(base, ())) == width:
