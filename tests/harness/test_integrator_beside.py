@@ -95,6 +95,8 @@ def test_an_option_of_heyoka_that_it_lacks_fails_its_own_row(tmp_path: Path, int
 def test_the_gate_measures_every_thing_that_a_gate_asks() -> None:
     kinds = {kind for kind, name, _ in labels("gate", "splitting:4") if name == "splitting:4"}
     assert kinds == {"drift", "homoclinic", "local_error", "work_precision", "growth"}
+    settings = {setting for _, name, setting in labels("growth", "splitting:4") if name == "splitting:4"}
+    assert settings == {""}  # no tolerance
 
 
 def test_who_stands_beside_heyoka_is_another_that_is_known(plan: str, tmp_path: Path) -> None:

@@ -162,6 +162,7 @@ def test_what_no_row_can_see_the_check_of_the_contract_names(fault: str, monkeyp
         ("dies at the fourth request", "unknown lines", "violated", "rk4 ended with exit code 1 before it said done"),
         ("begins otherwise", "two processes", "violated", "A new process answers otherwise than one in use"),
         ("other each time", "two processes", "note", "Not tested: one process answers equal requests with different"),
+        ("has small steps", "between steps", "kept", "Samples between steps are as accurate as the ends of runs."),
     ],
 )
 def test_what_follows_from_an_earlier_request_is_not_charged_to_the_next(fault, part, verdict, text) -> None:

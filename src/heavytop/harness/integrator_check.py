@@ -411,15 +411,15 @@ class _Contract:
             raise _Note("Not tested: it has neither step nor tolerance.")
         *values, finest = _CONTROLS[control]
         coarse, fine = (self._between(control, value) for value in values)
-        if coarse == fine and fine.between and self._between(control, finest) == fine:
+        kept = "Samples between steps are as accurate as the ends of runs."
+        if fine.between <= _RESTART_EPS * self.precision.eps:
+            return kept
+        if coarse == fine and self._between(control, finest) == fine:
             text = f"The errors with a {control} of {float(values[0]):.2g} and {float(finest):.2g} are equal: "
             if self.program:
                 raise _Violated(f'{text}the {control} is ignored. Use it, or declare setting = "none"')
             raise _Note(f"{text}perhaps the {control} is ignored.")
         as_at_ends = fine.between <= _DENSE_RATIO * fine.ends
-        kept = "Samples between steps are as accurate as the ends of runs."
-        if fine.between <= _RESTART_EPS * self.precision.eps:
-            return kept
         errors = (
             f"At a {control} of {float(values[1]):.2g} the error is {float(fine.between):.2g} between steps, and "
             f"{float(fine.ends):.2g} at the ends of runs"

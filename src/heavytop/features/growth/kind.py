@@ -16,6 +16,7 @@ from heavytop.errors import InputError
 from heavytop.harness.case_text import ensemble_of, one_motion
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.rows import Find, PlanTable, Task, computed, input_rounding
+from heavytop.integrate.registry import IntegratorSource, control_apart
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.kind import Kind
 from heavytop.measure.attitude_error import AttitudeScorer
@@ -83,6 +84,12 @@ class GrowthTable(PlanTable, tag=NAME):
     def tasks(self, find: Find) -> list[Task]:
         """A task for each row."""
         return [_task(case, run, self.integrator) for case in map(find, self.cases) for run in self.runs]
+
+    def with_integrator(self, which: str | IntegratorSource) -> PlanTable | None:
+        """Without the runs whose tolerance that integrator does not have."""
+        has = control_apart(which) == "tolerance"
+        runs = [run for run in self.runs if has or run.tolerance is None]
+        return PlanTable.with_integrator(msgspec.structs.replace(self, runs=runs), which) if runs else None
 
 
 def _task(case: Case, run: GrowthRun, integrator: str) -> Task:
