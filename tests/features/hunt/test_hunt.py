@@ -76,9 +76,10 @@ def test_a_fault_of_heavy_gyrostats_is_found_shrunk_and_kept(monkeypatch: pytest
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("integrator", "horizon", "law"), [("heyoka", 4, "eps A √(1 + rate T)"), ("splitting:4", 20, "(rate h)^order")]
+    ("integrator", "horizon", "law"),
+    [("heyoka", 4, "eps A √(1 + rate T)"), ("splitting:4", 20, "(rate h)^order"), ("splitting:4", "1e-60", "eps T/h")],
 )
-def test_a_healthy_integrator_has_none_and_says_what_explains_its_worst(integrator, horizon: int, law: str) -> None:
+def test_a_healthy_integrator_has_none_and_says_what_explains_its_worst(integrator, horizon, law: str) -> None:
     hunt = ht.hunt(integrator, budget=96, horizon=horizon, seed=3)
     assert (hunt.found, hunt.motions, hunt.seed) == ([], 96, 3)
     assert "Nothing found" in str(hunt)

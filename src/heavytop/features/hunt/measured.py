@@ -391,7 +391,7 @@ class MeasuredMotion:
     outcome: of its run; "" where the true motion is unknown, so that nothing is measured.  error: infinite for a run
     that did not reach its horizon.  amplification: of the motion.  turns: its rate times the horizon.
     other: the error of the integrator that it is compared with, None without one.  reason: why the run was aborted.
-    steps: of the default length, to the horizon.  order: of a method with fixed steps; 0 of others.
+    steps: of the default length, at least one, to the horizon.  order: of a method with fixed steps; 0 of others.
     """
 
     motion: Motion
@@ -459,7 +459,7 @@ class Meter:
             error = _error(run, true, unit)
             outcome = Outcome.NON_FINITE.value if math.isinf(error) and not _failed(run) else run.outcome
             other = _error(others[i], true, unit) if others else None
-            how = run.reason, float(abs(self.horizon) / DEFAULT_STEP), self._order
+            how = run.reason, max(1.0, float(abs(self.horizon) / DEFAULT_STEP)), self._order
             measured.append(MeasuredMotion(motion, outcome, error, growth, turns, other, *how))
         return measured
 
