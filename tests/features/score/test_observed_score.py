@@ -255,7 +255,10 @@ def test_a_sleeping_top_is_right_in_any_columns(tmp_path: Path) -> None:
         ({"frame": "moon"}, "frame must be space or body; got 'moon'"),
         ({"quaternion_order": "zyxw"}, "quaternion_order must be wxyz or xyzw; got 'zyxw'"),
         ({"sequence": "ZZX"}, "sequence = 'ZZX' is not known"),
-        ({"sequence": "xyz"}, "sequence = xyz is ambiguous"),
+        (
+            {"header": "t,euler1,euler2,euler3", "rows": "1,0,0,3", "sequence": "xyz"},
+            "sequence = xyz is ambiguous",
+        ),
         ({"mass": "1"}, "weight and mass were given"),
         ({"mass": "1", "weight": ""}, "The key gravity is missing"),
         ({"mass": "1", "gravity": "9.81", "weight": ""}, "reference point of the inertia tensor"),
@@ -351,7 +354,7 @@ def test_a_convention_of_an_array_that_is_not_given_is_refused(unused: dict) -> 
 def test_a_convention_of_no_column_is_reported(tmp_path: Path) -> None:
     keys = {"inertia": "3, 2, 1", "weight": "1", "centre": "1/2, 0, 0", "omega": "1, 0, 2", "gamma": "3/5, 0, 4/5"}
     table = "t,omega1,omega2,omega3,gamma1,gamma2,gamma3\n1,1,0,2,0.6,0,0.8\n"
-    unused = {"sequence": "ZXZ", "angles": "degrees", "up": "y", "pivot": "1, 2, 3", "matrix": "space_to_body"}
+    unused = {"sequence": "zxz", "angles": "degrees", "up": "y", "pivot": "1, 2, 3", "matrix": "space_to_body"}
     file = tmp_path / "motion.csv"
     for key, value in unused.items():
         file.write_text("".join(f"# {key}: {value}\n" for key, value in (keys | {key: value}).items()) + table)

@@ -403,9 +403,10 @@ def convention(document: Mapping[str, Any], header: Header | None = None) -> Con
     for key in ("quaternion", "matrix"):
         if _is_direction(document.get(key)):
             stated[key] = document[key].strip()
+    has_angles = header is None or "euler" in header.places or document.get("start_euler") is not None
     for key in ("sequence", "angles", "up"):
         if (word := _word(document, key)) is not None:
-            stated[key] = word if key == "sequence" else word.lower().lstrip("+")
+            stated[key] = word.lower().lstrip("+") if key != "sequence" else word if has_angles else word.upper()
     if header is not None and header.angles and stated.setdefault("angles", header.angles) != header.angles:
         raise InputError(f"The header declares {header.angles}, but angles = {stated['angles']}.", "Give it once.")
     for key in ("pivot", "point"):
