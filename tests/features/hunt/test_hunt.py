@@ -1,6 +1,7 @@
 """Planted faults are found, shrunk and proven; a healthy integrator has none."""
 
 import json
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -167,6 +168,7 @@ def test_what_is_rounded_on_the_way_may_grow_by_more_than_what_is_rounded_at_the
     (found,) = meter.measure([(top, start)])
     assert meter.sharper(found).amplification > 2 * found.amplification
     assert found.error < 100 * meter.sharper(found).explained(2.0**-52)
+    assert replace(found, order=1000, turns=2e4, steps=1.0).explained(2.0**-52) > 1e200
 
 
 @pytest.mark.slow

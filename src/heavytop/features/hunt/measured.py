@@ -380,6 +380,8 @@ _DIRECTION = tuple(Fraction(n, 1000) for n in (427, -331, 373, 461, -397, 433))
 """The direction of the second start: nearly a unit vector, in no plane of symmetry of a body."""
 _STEP_LIMIT = 1_000_000
 _LEAST = 1e-300
+_MOST_ORDER = 60
+"""A higher declared order leaves the range of doubles where a step is of many radians."""
 ROUNDINGS = 20
 """Roundings of a fixed step, all in one direction."""
 
@@ -412,9 +414,8 @@ class MeasuredMotion:
         """That error; of a method with fixed steps one of 20 eps in each step, and of (rate h)^order in each radian."""
         if not self.order:
             return self.rounding(eps)
-        return self.amplification * (
-            ROUNDINGS * eps * self.steps + self.turns * (self.turns / self.steps) ** self.order
-        )
+        truncation = (self.turns / self.steps) ** min(self.order, _MOST_ORDER)
+        return self.amplification * (ROUNDINGS * eps * self.steps + self.turns * truncation)
 
 
 class Meter:

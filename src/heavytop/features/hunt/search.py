@@ -339,7 +339,7 @@ class Hunted:
     @property
     def law_text(self) -> str:
         """The law of the errors of this integrator."""
-        fixed = any(m.order for m in self.worst)
+        fixed = any(m.order for m in (*self.worst, *self.found))
         truncation = f"({ROUNDINGS} eps T/h + rate T (rate h)^order)"
         return f"{self.law:.2g} A {truncation}" if fixed else f"{self.law:.2g} eps A √(1 + rate T)"
 
