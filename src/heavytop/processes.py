@@ -6,9 +6,13 @@ each.  The children of this program do not need the script: they import their fu
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
+import pickle
 import signal
+import sys
+import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager, suppress
@@ -198,3 +202,29 @@ class GuardedProcess:
             self._guard.end()
         kill_marked(self._context.mark)
         self._pool.shutdown(wait=True, cancel_futures=True)
+
+
+@contextmanager
+def forked(work: Callable[[], T]) -> Iterator[Callable[[], T | None] | None]:
+    """Calls ``work`` in a copy of this process, which ends with the block, or with its work where this process is
+    killed; the function waits for the result, which is None where ``work`` raises.  None in place of the function on
+    other systems than Linux.  Other threads must hold no lock that ``work`` needs.
+    """
+    if sys.platform != "linux":
+        yield None
+        return
+    readable, writable = os.pipe()
+    with warnings.catch_warnings(action="ignore", category=DeprecationWarning):  # of idle threads of libraries
+        child = os.fork()
+    if not child:
+        gc.disable()
+        with suppress(BaseException), open(writable, "wb") as pipe:
+            pipe.write(pickle.dumps(work()))
+        os._exit(0)  # without the exit handlers of its parent
+    os.close(writable)
+    try:
+        with open(readable, "rb") as pipe:
+            yield lambda: pickle.loads(content) if (content := pipe.read()) else None
+    finally:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)

@@ -1,8 +1,14 @@
 """What was done to a report on disk is never "the same"; read for a comparison it is the report it is."""
 
 import json
+import os
+import signal
+import sys
+from collections.abc import Callable
 from copy import deepcopy
 from pathlib import Path
+from random import Random
+from time import sleep
 from typing import Any
 
 import msgspec
@@ -11,9 +17,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from heavytop.errors import InputError
-from heavytop.records import Law, Metric
-from heavytop.report.compare.noise import Policy
-from support.reports import compare, store
+from heavytop.processes import forked
+from heavytop.records import Law, Metric, Row
+from heavytop.report.compare import compare as comparing
+from heavytop.report.compare.noise import Policy, Rule
+from support.reports import compare, replace, store
 from support.small_reports import error, report, row
 
 GOOD = report(
@@ -152,3 +160,73 @@ def test_a_row_missing_at_the_start_and_one_new_are_told_apart(tmp_path: Path) -
     result = compare(store.read_brief(tmp_path / "a"), store.read_brief(tmp_path / "b"), Policy())
     assert [(f.row.case, f.verdict.value) for f in result.changed] == [("a", "missing"), ("f", "new")]
     assert result.exit_code == 3
+
+
+RULES = [Rule(case="top1*", metric="drift_*", loss_bits="9"), Rule(case="new", ignore=True), Rule(case="x")]
+
+
+def edited(rows: list[Row], random: Random) -> list[Row]:
+    """Rows with some removed, new, moved, repeated, larger, with more steps, without numbers, or contradictory."""
+    rows = list(rows)
+    for _ in range(random.choice([0, 1, 2, 5])):
+        at, other = random.sample(range(len(rows)), 2)
+        old = rows[at]
+        larger = {name: error("1E-9") for name in old.metrics}
+        rows[at : at + 1] = random.choice(
+            [
+                [],
+                [old, row(case="new")],
+                [rows[other]],
+                [replace(old, metrics=larger)],
+                [replace(old, steps=100)],
+                [replace(old, metrics={})],
+                [replace(old, metrics={"drift_energy_max": Metric("1E-3", -9.0)})],
+            ]
+        )
+    return rows
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a process is copied on Linux alone")
+def test_halves_that_two_processes_compare_make_the_same_comparison(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    halves, join = [], comparing._Part.extend
+    monkeypatch.setattr(comparing._Part, "extend", lambda part, later: (halves.append(later), join(part, later)))
+    for seed in range(60):
+        random = Random(seed)
+        empty = {"metrics": {}, "integrator": "mine"}
+        policy = Policy(rule=random.choice([[], RULES]))
+        rows = [row(case=f"top{i}", **random.choice([{}, {}, {}, empty])) for i in range(random.randrange(8, 20))]
+        for name, some in (("a", rows), ("b", edited(rows, random))):
+            (tmp_path / name).mkdir(exist_ok=True)
+            store.write(report(*some), tmp_path / name)
+        results: list[Any] = []
+        for many in (10_000, 2):
+            monkeypatch.setattr(comparing, "_MANY", many)
+            try:
+                briefs = [store.read_brief(tmp_path / name) for name in ("a", "b")]
+                results.append(compare(*briefs, policy, list_same=False))
+            except InputError as refused:
+                results.append(str(refused))
+        assert results[0] == results[1], seed
+    assert 15 < len(halves) < 60
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a process is copied on Linux alone")
+def test_a_copied_process_gives_its_result_or_none_and_ends() -> None:
+    def ends() -> None:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    def raises() -> None:
+        raise KeyboardInterrupt
+
+    expected: list[tuple[Callable[[], Any], Any]] = [(lambda: "x" * 10**6, "x" * 10**6), (raises, None), (ends, None)]
+    for work, result in expected:
+        with forked(work) as answer:
+            assert answer is not None
+            assert answer() == result
+    children = Path(f"/proc/self/task/{os.getpid()}/children")
+    before = children.read_text()
+    with forked(lambda: sleep(1000)):
+        assert children.read_text() != before
+    assert children.read_text() == before

@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, fields
+from itertools import repeat
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -268,7 +270,8 @@ def compared(
     """Compare like :func:`compare`.  list_same: False to count unchanged metrics.  read: called after each report."""
     rules = policies.Policy() if policy is None else policies.load(arguments.path(policy, "policy"))
     rules = policies.adjusted(rules, arguments.limit(floor, "floor"), arguments.limit(loss, "loss"))
-    old, new = _report(baseline, "baseline", read), _report(candidate, "candidate", read)
+    with ThreadPoolExecutor(2) as pool:
+        old, new = pool.map(_report, (baseline, candidate), ("baseline", "candidate"), repeat(read))
     folders = None
     if not isinstance(baseline, records.Report) and not isinstance(candidate, records.Report):
         folders = _folder(arguments.path(baseline, "baseline")), _folder(arguments.path(candidate, "candidate"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
@@ -13,6 +13,7 @@ from msgspec.structs import replace
 
 from heavytop.errors import ExitCode, InputError
 from heavytop.integrate.registry import is_third_party
+from heavytop.processes import forked
 from heavytop.records import Identity, Row
 from heavytop.report.compare.findings import RANK, Change, Changes, sentences
 from heavytop.report.compare.noise import Policy
@@ -20,10 +21,12 @@ from heavytop.report.compare.rows import Finding, RowComparison
 from heavytop.report.compare.verdicts import Verdict
 from heavytop.report.document.kind import Kinds, kind_of
 from heavytop.report.document.motions import WorseMotions
-from heavytop.report.store.store import AnyReport, Brief
+from heavytop.report.store.store import AnyReport, Brief, BriefRows
 
 __all__ = ["Differences", "Finding", "compare"]
 
+_MANY = 10_000
+"""Rows of each half from which a second process is faster."""
 _MACHINE = ("system", "machine", "processor", "simd_width_double", "cpu_features")
 _VERSIONS = ("python", "implementation", "flint", "llvm", "cpu_target")
 
@@ -98,61 +101,37 @@ def compare(
     folders: of both reports; rows of kinds with records of single motions are joined by motion.
     Raises InputError where no row is in the baseline, or the policy leaves nothing to compare.
     """
-    findings_by_row: list[list[Finding]] = []
-    missing: list[tuple[int, Row]] = []
-    motions: list[WorseMotions | None] = []
-    changes = Changes()
     environments, when = (baseline.environment, candidate.environment), policy.timings.compare
     same_machine = _agree(*environments, _MACHINE)
     timed = when == "always" or (when == "same-machine" and same_machine)
     same_versions = _agree(*environments, _VERSIONS) and _packages(environments[0]) == _packages(environments[1])
     checked = isinstance(baseline, Brief), isinstance(candidate, Brief)
+    repeated = same_machine and same_versions
+
+    def new_part() -> _Part:
+        return _Part(RowComparison(policy, kinds, timed, list_same, checked, repeated), folders)
+
+    part = None
     if isinstance(baseline, Brief) and isinstance(candidate, Brief):
+        if not list_same:
+            part = _by_halves(baseline.rows, candidate.rows, new_part)
         candidate.rows.twins = baseline.rows
-    rows = RowComparison(policy, kinds, timed, list_same, checked, same_machine and same_versions)
-    unmatched = _UnmatchedRows(candidate.rows)
-    measured, unmeasured = set[str](), dict[str, tuple[int, int, Row]]()
-    for row in baseline.rows:
-        if (match := unmatched.take(row)) is not None:
-            subject, same = row.key.subject, rows.same
-            findings = rows.compare(row, match)
-            if row.metrics or match.metrics:
-                measured.add(subject.name)
-            elif subject.what == "computed" and is_third_party(subject.name) and not rows.ignores(row):
-                unmeasured.setdefault(subject.name, (len(findings_by_row), rows.same - same, match))
-            findings_by_row.append(changes.add(row, match, findings))
-            if folders is not None and not rows.ignores(row):
-                motions.append(kind_of(row, kinds).join(row, match, folders, partial(rows.limits, row)))
-        elif not rows.ignores(row):
-            missing.append((len(findings_by_row), row))
-            findings_by_row.append([])
-    for index, row in missing:
-        if (match := unmatched.take_elsewhere(row)) is not None:
-            findings = rows.compare(row, match)[:1]
-        else:
-            findings = [Finding(row.identity, "", Verdict.MISSING, row.outcome, None, "the row is missing")]
-        findings_by_row[index] = changes.add(row, match, findings)
-    for name, (index, counted, row) in unmeasured.items():
-        if name not in measured and not any(f.verdict is not Verdict.SAME for f in findings_by_row[index]):
-            cause = f"no row of {name} has a number"
-            lacking = Finding(row.identity, "", Verdict.INCOMPARABLE, row.outcome, row.outcome, cause)
-            findings_by_row[index] = changes.add(row, row, [lacking])
-            rows.same -= counted
-    for row in unmatched.left():
-        if not rows.ignores(row):
-            new = Finding(row.identity, "", Verdict.NEW, None, row.outcome)
-            findings_by_row.append(changes.add(None, row, [new]))
+    if part is None:
+        part = new_part()
+        part.compare(baseline.rows, candidate.rows)
+    part.judge_unmeasured()
+    rows, changes = part.rows, part.changes
     excused = changes.excused()
     findings = [
         replace(finding, verdict=Verdict.SAME, reason="") if excused(finding) else finding
-        for finding in chain.from_iterable(findings_by_row)
+        for finding in chain.from_iterable(part.findings_by_row)
     ]
     if not rows.same and all(finding.verdict is Verdict.NEW for finding in findings):
         remedy = "Compare reports of `heavytop run` that have rows, by a policy that does not ignore all of them."
         raise InputError("There is nothing to compare.", remedy)
     same = rows.same + sum(finding.verdict is Verdict.SAME for finding in findings)
     planned = "seed" in baseline.plan | candidate.plan  # a score has no plan
-    joined = [motion for motion in motions if motion is not None]
+    joined = [motion for motion in part.motions if motion is not None]
     return Differences(
         findings,
         (_differences({"plan": baseline.plan}, {"plan": candidate.plan}) if planned else [])
@@ -166,6 +145,106 @@ def compare(
         changes.worst_first,
         joined,
     )
+
+
+@dataclass
+class _Part:
+    """The comparison of consecutive rows of both reports.
+
+    measured: the integrators with a number.  unmeasured: of each third-party one without in a row, the place of the
+    first such row among the findings, its number of unchanged metrics, and the row.
+    findings_by_row: of rows that have some or no metrics.  unpaired: the number of rows that only one report has.
+    """
+
+    rows: RowComparison
+    folders: tuple[Path, Path] | None
+    changes: Changes = field(default_factory=Changes)
+    findings_by_row: list[list[Finding]] = field(default_factory=list)
+    motions: list[WorseMotions | None] = field(default_factory=list)
+    measured: set[str] = field(default_factory=set)
+    unmeasured: dict[str, tuple[int, int, Row]] = field(default_factory=dict)
+    unpaired: int = 0
+
+    def compare(self, baseline: Iterable[Row], candidate: Any) -> None:
+        """Compares all rows, in the baseline's order, new ones last."""
+        rows, unmatched = self.rows, _UnmatchedRows(candidate)
+        missing: list[tuple[int, Row]] = []
+        for row in baseline:
+            if (match := unmatched.take(row)) is not None:
+                self._pair(row, match)
+            elif not rows.ignores(row):
+                missing.append((len(self.findings_by_row), row))
+                self.findings_by_row.append([])
+        for index, row in missing:
+            if (match := unmatched.take_elsewhere(row)) is not None:
+                findings = rows.compare(row, match)[:1]
+            else:
+                findings = [Finding(row.identity, "", Verdict.MISSING, row.outcome, None, "the row is missing")]
+            self.findings_by_row[index] = self.changes.add(row, match, findings)
+        self.unpaired = len(missing)
+        for row in unmatched.left():
+            self.unpaired += 1
+            if not rows.ignores(row):
+                new = Finding(row.identity, "", Verdict.NEW, None, row.outcome)
+                self.findings_by_row.append(self.changes.add(None, row, [new]))
+
+    def _pair(self, row: Row, match: Row) -> None:
+        rows, subject, same = self.rows, row.key.subject, self.rows.same
+        findings = self.changes.add(row, match, rows.compare(row, match))
+        if row.metrics or match.metrics:
+            self.measured.add(subject.name)
+        elif subject.what == "computed" and is_third_party(subject.name) and not rows.ignores(row):
+            self.unmeasured.setdefault(subject.name, (len(self.findings_by_row), rows.same - same, match))
+        if findings or not match.metrics:
+            self.findings_by_row.append(findings)
+        if self.folders is not None and not rows.ignores(row):
+            self.motions.append(kind_of(row, rows.kinds).join(row, match, self.folders, partial(rows.limits, row)))
+
+    def extend(self, later: _Part) -> None:
+        """Adds the comparison of the rows that follow."""
+        for name, (index, same, row) in later.unmeasured.items():
+            self.unmeasured.setdefault(name, (index + len(self.findings_by_row), same, row))
+        self.measured |= later.measured
+        self.findings_by_row += later.findings_by_row
+        self.motions += later.motions
+        self.changes.extend(later.changes)
+        self.rows.extend(later.rows)
+
+    def judge_unmeasured(self) -> None:
+        """Makes the first row of each third-party integrator without a number incomparable."""
+        for name, (index, counted, row) in self.unmeasured.items():
+            if name not in self.measured and not any(
+                f.verdict is not Verdict.SAME for f in self.findings_by_row[index]
+            ):
+                cause = f"no row of {name} has a number"
+                lacking = Finding(row.identity, "", Verdict.INCOMPARABLE, row.outcome, row.outcome, cause)
+                self.findings_by_row[index] = self.changes.add(row, row, [lacking])
+                self.rows.same -= counted
+
+
+def _by_halves(baseline: BriefRows, candidate: BriefRows, new_part: Callable[[], _Part]) -> _Part | None:
+    """The comparison of many rows in two processes; None for few rows, where a half has a row that only one report has,
+    and where a row is repeated or invalid in the second half: then the order of all rows matters.
+    """
+    half = len(baseline) // 2
+    if len(baseline) != len(candidate) or half < _MANY or not baseline[half].has_identity_of(candidate[half]):
+        return None
+
+    def compared(places: slice) -> tuple[_Part, set[int], set[int]]:
+        part, old, new = new_part(), baseline.at(places), candidate.at(places)
+        new.twins = old
+        part.compare(old, new)
+        return part, old.seen, new.seen
+
+    with forked(lambda: compared(slice(half, None))) as later_half:
+        if later_half is None:
+            return None
+        part, *seen = compared(slice(half))
+        result = None if part.unpaired else later_half()
+    if result is None or result[0].unpaired or any(map(set.intersection, seen, result[1:])):
+        return None
+    part.extend(result[0])
+    return part
 
 
 class _UnmatchedRows:

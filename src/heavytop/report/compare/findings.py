@@ -181,6 +181,14 @@ class Changes:
                 self.points.setdefault(_curve(old.identity), []).append(point)
         return findings
 
+    def extend(self, later: Changes) -> None:
+        """Adds the changes of the rows that follow."""
+        held = max(0, _MOST_HELD - len(self.rows))
+        self.rows += later.rows[:held] + [change._replace(old=None, new=None) for change in later.rows[held:]]
+        for curve, points in later.points.items():
+            self.points.setdefault(curve, []).extend(points)
+        self._third_party |= later._third_party
+
     def excused(self) -> Callable[[Finding], bool]:
         """Removes excused findings from the rows, and returns the test for them.
 
@@ -207,14 +215,20 @@ class Changes:
         self.rows = [change for change in verdicts if not is_yardstick(change.findings[0])]
         return lambda finding: is_compensated(finding) or is_yardstick(finding)
 
-    def coarser(self, change: Change) -> str:
+    def by_curve(self) -> dict[_Curve, list[Change]]:
+        """The rows of each work-precision curve."""
+        curves: dict[_Curve, list[Change]] = {}
+        for change in self.rows:
+            curves.setdefault(_curve(change.identity), []).append(change)
+        return curves
+
+    def coarser(self, curve: _Curve, changed: Sequence[Change]) -> str:
         """``are the same`` or ``lost less`` where the finest setting of an integrator on a case lost most, with equal
-        steps; else empty.
+        steps; else empty.  changed: the rows of the curve.
 
         Such a new error decreases more slowly than the error of the method, which hides it at coarser settings.
         """
-        curve = _curve(change.identity)
-        points, changed = self.points.get(curve, []), [c for c in self.rows if _curve(c.identity) == curve]
+        points = self.points.get(curve, [])
         if len(points) < 2 or not all(abs(change.growth_of_steps) <= _STEPS_MOVED for change in changed):
             return ""
         finest = max(steps for (steps, _), _ in points)
@@ -564,6 +578,7 @@ def _quantity(quantity: Quantity | None, name: str) -> str:
 
 def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:
     """Drifts, escape times, local errors, seconds: the largest change of each quantity and integrator."""
+    curves = changes.by_curve()
     by_quantity: dict[tuple[str, str], list[tuple[float, Change, Finding]]] = {}
     for change in rows:
         for _, findings in folded(change):
@@ -583,7 +598,8 @@ def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdic
         named = frozenset(c.identity for _, c, _ in cases)
         also = f"; also on {plural(len(named) - 1, 'other row')}" if len(named) > 1 else ""
         error = Verdict.WORSE in verdicts and (finding.of == "series" or change.decades(finding.metric) is not None)
-        coarser = {changes.coarser(c) for _, c, _ in cases} if error else {""}
+        touched = {_curve(c.identity) for _, c, _ in cases} if error else set()
+        coarser = {changes.coarser(curve, curves[curve]) for curve in touched} or {""}
         below = "" if "" in coarser else _LOWER_ORDER.format(min(coarser, key=len))
         yield Sentence(f"{what[0].upper()}{what[1:]}{values} on {_where(change.identity)}{reason}{also}{below}.", named)
 

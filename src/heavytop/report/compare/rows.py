@@ -369,6 +369,14 @@ class RowComparison:
     def __post_init__(self) -> None:
         self.limits = Lookup(self.policy)
 
+    def extend(self, later: RowComparison) -> None:
+        """Adds the counts and failures of the rows that follow, and the rules applied to them."""
+        self.same += later.same
+        self.failed += later.failed
+        self.unsupported += later.unsupported
+        self.limits.hidden |= later.limits.hidden
+        self.limits.unused = {i: rule for i, rule in self.limits.unused.items() if i in later.limits.unused}
+
     def ignores(self, row: Row) -> bool:
         """Whether a rule ignores the whole row: one whose pattern matches every metric."""
         self.limits.note(row)
@@ -476,7 +484,7 @@ class RowComparison:
             allowed = max(allowed, min(STEP_CONTROL, usual.noise * allowed_loss(metric, match)))
         if abs(before - after) > allowed or metric.bound or match.bound:
             return False
-        if noisier(pair.kind, metric, match, bool(pair.old.reference.until)):
+        if (new_band or 0.0) > (band or 0.0) and noisier(pair.kind, metric, match, bool(pair.old.reference.until)):
             return False
         if metric.quantity is None or metric.quantity.statistic != "final":
             return True
@@ -625,15 +633,15 @@ class RowComparison:
 
     def _inconsistent(self, old: Row, new: Row) -> str:
         """The first contradiction within one of the rows; empty without any."""
-        for row, which, checked in zip((old, new), ("baseline", "candidate"), self.checked, strict=True):
-            if not checked and (problem := next(contradictions(row, kind_of(row, self.kinds)), "")):
+        for row, which in () if all(self.checked) else ((old, "baseline"), (new, "candidate")):
+            if problem := next(contradictions(row, kind_of(row, self.kinds)), ""):
                 return f"the {which} is inconsistent: {problem}"
         return ""
 
 
 def _samples(row: Row) -> int:
     """The number of samples of a row; where it is not stated that of its longest series."""
-    return row.samples or max((len(series.times) for series in row.series.values()), default=0)
+    return row.samples or (max(len(series.times) for series in row.series.values()) if row.series else 0)
 
 
 def summaries(row: Row, series: str, *statistics: str) -> list[Metric]:

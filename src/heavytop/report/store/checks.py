@@ -333,8 +333,8 @@ def _problems(row: Row, kind: ReportedKind) -> Iterator[str]:
 
 
 def _of_fields(row: Row, kind: ReportedKind) -> Iterator[str]:
-    for name in ("horizon", "time_reached"):
-        if cause := _cause(getattr(row, name)):
+    for name, time in (("horizon", row.horizon), ("time_reached", row.time_reached)):
+        if cause := _cause(time):
             yield f"{name}: {cause}"
     if row.outcome not in _OUTCOMES:
         yield f"outcome: must be a known one; got {row.outcome[:60]!r}"
@@ -400,6 +400,7 @@ def _of_series(series: Series) -> Iterator[str]:
         yield from filter(None, map(_cause, (*series.times, *numbers)))
 
 
+@lru_cache(1 << 12)
 def _cause(text: str) -> str:
     """The reason why a text is not a number; empty where it is one."""
     try:

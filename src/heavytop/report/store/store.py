@@ -9,7 +9,6 @@ import platform
 import re
 import zlib
 from collections.abc import Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from importlib import metadata
 from mmap import ACCESS_READ, mmap
@@ -69,7 +68,7 @@ class Brief:
         self.file = file
         self.plan = parts.plan
         self.environment = parts.environment
-        self.rows = _Rows(file, parts.rows, kinds)
+        self.rows = BriefRows(file, parts.rows, kinds)
 
 
 class _Parts(msgspec.Struct, frozen=True):
@@ -79,11 +78,11 @@ class _Parts(msgspec.Struct, frozen=True):
     rows: list[msgspec.Raw]
 
 
-class _Rows:
+class BriefRows:
     """The rows of a brief report; raises InputError at an invalid one.
 
     twins: the rows of another brief report, iterated in step: a row that equals its twin but for its seconds is neither
-    decoded nor checked again.
+    decoded nor checked again.  seen: hashes of the names of the rows iterated last.
     """
 
     def __init__(self, file: Path, rows: list[msgspec.Raw], kinds: Kinds) -> None:
@@ -92,7 +91,12 @@ class _Rows:
         self._rows = rows
         self._decoder = msgspec.json.Decoder(Row)
         self._checked: dict[int, Row] = {}
-        self.twins: _Rows | None = None
+        self.twins: BriefRows | None = None
+        self.seen = set[int]()
+
+    def at(self, places: slice) -> BriefRows:
+        """The rows at consecutive places."""
+        return BriefRows(self._file, self._rows[places], self._kinds)
 
     def _decode(self, row: msgspec.Raw) -> Row:
         return records.of_row(self._decoder.decode(row))
@@ -122,7 +126,7 @@ class _Rows:
         return self._decode(self._rows[number])
 
     def __iter__(self) -> Iterator[Row]:
-        seen: set[int] = set()
+        seen = self.seen = set()
         repeated = False
         chunk = max(1, _CHUNK // len(bytes(self._rows[0]))) if self._rows else 1
         for start in range(0, len(self._rows), chunk):
@@ -203,14 +207,12 @@ def _read(path: Path, kind: type[_Content]) -> tuple[Path, _Content]:
     if not content.lstrip().startswith(b"{"):
         remedy = f"`heavytop score {file}` reads a trajectory." if file.suffix == ".csv" else REMEDY
         raise InputError(f"{str(file)[:_NAME]} is not a whole report: it is not a JSON object.", remedy)
-    with ThreadPoolExecutor(1) as thread:
-        digest = thread.submit(_has_its_digest, file, content)
-        try:
-            report = msgspec.json.decode(content, type=kind)
-            problem = ""
-        except _UNREADABLE as error:
-            problem = str(error)
-        unchanged = digest.result()
+    unchanged = _has_its_digest(file, content)
+    try:
+        report = msgspec.json.decode(content, type=kind)
+        problem = ""
+    except _UNREADABLE as error:
+        problem = str(error)
     if problem or report.schema != SCHEMA:
         with suppress(*_UNREADABLE):
             schema = msgspec.json.decode(content, type=_Schema).schema
