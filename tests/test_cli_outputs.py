@@ -14,7 +14,6 @@ import pytest
 from typer.testing import CliRunner
 
 from heavytop.cli import app
-from heavytop.cli.motions import with_file_of_latex
 from heavytop.errors import InputError
 from heavytop.features.score.measurement import assess
 from heavytop.features.score.trajectories.files import read
@@ -119,7 +118,7 @@ def test_propagates_json_with_outputs_is_read_by_score(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_latex_is_a_whole_table_of_siunitx_and_booktabs(tmp_path: Path) -> None:
-    text = heavytop("reference", "--show", "quaternion", "--digits", "80", "--latex", "-")
+    text = heavytop("reference", "--latex", "--show", "quaternion", "--digits", "80")
     for part in (r"\usepackage{siunitx}", r"\usepackage{booktabs}", r"\toprule", r"\midrule", r"\bottomrule"):
         assert text.count(part) == 1
     assert r"$\num{1}/\num{3}$" in text
@@ -162,14 +161,6 @@ def test_bibtex_cites_program_command_and_source_and_no_path(tmp_path: Path, gam
     assert source in fields["note"]
     assert str(tmp_path) not in text
     assert "numbers" not in text
-
-
-@pytest.mark.parametrize(
-    ("given", "taken"),
-    [("--latex --digits 9", "--latex - --digits 9"), ("--latex", "--latex -"), ("--latex x.tex", "--latex x.tex")],
-)
-def test_latex_needs_no_file(given: str, taken: str) -> None:
-    assert with_file_of_latex(["reference", *given.split()]) == ["reference", *taken.split()]
 
 
 @pytest.mark.slow

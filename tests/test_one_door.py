@@ -142,7 +142,7 @@ def test_good_input_propagates_to_the_same_numbers(name: str) -> None:
     assert (printed["outcome"], printed["steps"]) == (run.outcome.value, run.steps)
     assert "step" not in given or run.steps == 3 + 5
     assert (printed["system"], printed["integrator"]) == (run.problem.system.name, run.integrator)
-    assert printed["precision"] == run.problem.precision.name
+    assert (printed["precision"], printed["bits"]) == (run.problem.precision.name, run.problem.precision.bits)
     assert run.integrator != "multiword" or {"words", "bits", "step_rule", "tolerance"} <= printed["flags"].keys()
     metrics = {name: number["value"] for name, number in printed["metrics"].items()}
     drifts = {name: (each.max, each.rms, each.final) for name, each in ht.drift(run).items()}

@@ -16,7 +16,7 @@ from heavytop.records import NOT_CARRIED, Row
 from heavytop.report.compare.noise import Policy
 from heavytop.report.compare.verdicts import Verdict
 from support.helpers import shown
-from support.reports import compare, read_plan, summary
+from support.reports import asked, compare, drift, summary, tasks_of
 from support.small_reports import report
 
 pytestmark = pytest.mark.slow
@@ -45,29 +45,18 @@ def solve(top, start, times, precision, *, system, xi=None):
 def plain(top, start, times, precision, *, system):
     return propagate(top, start, times, precision, system=system)
 '''
-PLAN = """name = "theirs"
-integrators = ["mine.py:{function}"]
-[[measure]]
-kind = "drift"
-cases = ["bruels-cardona-arnold", "gyrostat", "heavy-gyrostat"]
-attitude = true
-integrator = "mine.py:{function}"
-noise = false
-runs = [{{ precision = "double", horizon = "2", samples = 4 }}]
-[[measure]]
-kind = "growth"
-cases = ["lagrange"]
-integrator = "mine.py:{function}"
-runs = [{{ precision = "double", horizon = "2", starts = 2, samples = 4, decades = 1, attitude = true }}]
-"""
 
 
 def measured(folder: Path, function: str = "solve", rate: float = 0.0, numbers: int = 9) -> list[Row]:
     """The rows of the plan with an integrator of that rate."""
     folder.mkdir(exist_ok=True)
     (folder / "mine.py").write_text(PEER.format(rate=rate, numbers=numbers), "utf-8")
-    (folder / "plan.toml").write_text(PLAN.format(function=function), "utf-8")
-    tasks = read_plan(str(folder / "plan.toml"))[2]
+    theirs = {"integrator": f"mine.py:{function}"}
+    many = {"precision": "double", "horizon": "2", "starts": 2, "samples": 4, "decades": 1, "attitude": True}
+    cases = "bruels-cardona-arnold", "gyrostat", "heavy-gyrostat"
+    tables = drift(*cases, attitude=True, noise=False, runs=[("double", "2", 4)], **theirs)
+    tables += asked("growth", "lagrange", runs=[many], **theirs)
+    tasks = tasks_of(folder, f'integrators = ["mine.py:{function}"]\n{tables}')
     return [suite_rows.measure(KINDS[task.key.kind], task, Saved()) for task in tasks]
 
 

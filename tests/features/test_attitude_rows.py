@@ -9,39 +9,19 @@ from typing import Any
 import pytest
 
 import heavytop as ht
-from support.reports import measure, tasks_of
+from support.reports import asked, drift, measure, plan_file, table, tasks_of
 
-PLAN = """name = "bodies"
-[[top]]
-name = "tilted"
-mass = "2"
-gravity = "9.81"
-about = "pivot"
-centre = ["0.1", "-0.2", "0.3"]
-inertia = ["0.7", "0.7", "0.9", "0.1", "-0.05", "0.02"]
-omega = ["1", "2", "-3"]
-euler = "ZYX:30deg,0.2,1"
-[[top]]
-name = "spinner"
-mass = "1"
-gravity = "0"
-centre = ["0", "0", "0"]
-inertia = ["350", "300", "400"]
-rotor = ["3500", "0", "0"]
-omega = ["61", "1", "1"]
-quaternion = ["1", "0", "0", "0"]
-"""
-TABLE = """[[measure]]
-kind = "drift"
-cases = ["tilted", "spinner"]
-attitude = {attitude}
-integrator = "{integrator}"
-runs = [{{ precision = "{precision}", horizon = "2", samples = 20 }}]
-"""
+BODY = {"about": "pivot", "centre": ["0.1", "-0.2", "0.3"], "inertia": ["0.7", "0.7", "0.9", "0.1", "-0.05", "0.02"]}
+SPINNER = {"centre": ["0", "0", "0"], "inertia": ["350", "300", "400"], "rotor": ["3500", "0", "0"]}
+TOPS = table(
+    "top", name="tilted", mass="2", gravity="9.81", **BODY, omega=["1", "2", "-3"], euler="ZYX:30deg,0.2,1"
+) + table(
+    "top", name="spinner", mass="1", gravity="0", **SPINNER, omega=["61", "1", "1"], quaternion=["1", "0", "0", "0"]
+)
 
 
-def plan(**table: str) -> str:
-    return PLAN + TABLE.format(**table)
+def plan(integrator: str = "heyoka", attitude: bool = True) -> str:
+    return TOPS + drift("tilted", "spinner", attitude=attitude, integrator=integrator, runs=[("double", "2", 20)])
 
 
 @pytest.fixture(scope="module")
@@ -49,9 +29,8 @@ def rows(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., dict[str, An
     """The row of each case with an integrator, in double; each measured once."""
 
     @cache
-    def measured(integrator: str, attitude: str) -> dict[str, Any]:
-        table = {"integrator": integrator, "precision": "double", "attitude": attitude}
-        tasks = tasks_of(tmp_path_factory.mktemp("rows"), plan(**table))
+    def measured(integrator: str, attitude: bool) -> dict[str, Any]:
+        tasks = tasks_of(tmp_path_factory.mktemp("rows"), plan(integrator, attitude))
         return {task.key.case: measure(task) for task in tasks}
 
     return measured
@@ -62,8 +41,8 @@ def rows(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., dict[str, An
 def test_the_attitude_and_the_position_are_measured_as_far_as_they_are_there(
     rows: Callable[..., dict[str, Any]], integrator: str
 ) -> None:
-    assert rows(integrator, "true").keys() == {"tilted", "spinner"}
-    for case, row in rows(integrator, "true").items():
+    assert rows(integrator, True).keys() == {"tilted", "spinner"}
+    for case, row in rows(integrator, True).items():
         assert row.outcome == "success"
         for name in ("attitude_error", *(["position_error"] if case == "tilted" else [])):
             assert 0 < float(row.metrics[f"{name}_max"].value) < 500 * 2.0**-52
@@ -73,7 +52,7 @@ def test_the_attitude_and_the_position_are_measured_as_far_as_they_are_there(
 
 @pytest.mark.slow
 def test_the_states_are_those_of_a_run_without_attitude_to_rounding(rows: Callable[..., dict[str, Any]]) -> None:
-    with_it, without = (rows("heyoka", flag) for flag in ("true", "false"))
+    with_it, without = (rows("heyoka", flag) for flag in (True, False))
     assert without.keys() == {"tilted", "spinner"}
     for key, row in without.items():
         assert "attitude_error_max" not in row.metrics
@@ -83,8 +62,7 @@ def test_the_states_are_those_of_a_run_without_attitude_to_rounding(rows: Callab
 @pytest.mark.slow
 def test_the_band_of_a_body_with_a_rotor_is_rounding_noise(tmp_path: Path) -> None:
     """Reruns scale the rotor with the moments: else they are other motions, with bands of many decades."""
-    (tmp_path / "plan.toml").write_text(plan(integrator="heyoka", precision="double", attitude="true"), "utf-8")
-    report = ht.run(tmp_path / "plan.toml", out=tmp_path / "out", workers=1)
+    report = ht.run(plan_file(tmp_path, plan()), out=tmp_path / "out", workers=1)
     (row,) = (each for each in report.rows if each.case == "spinner")
     bands = [
         metric.band for name, metric in row.metrics.items() if name.startswith(("drift", "solution")) and metric.band
@@ -108,37 +86,28 @@ def test_the_band_of_a_body_with_a_rotor_is_rounding_noise(tmp_path: Path) -> No
 def test_a_body_that_is_none_is_refused_by_the_name_of_its_top(
     tmp_path: Path, old: str, new: str, message: str
 ) -> None:
-    table = plan(integrator="heyoka", precision="double", attitude="true")
-    (tmp_path / "plan.toml").write_text(table.replace(old, new, 1), "utf-8")
+    file = plan_file(tmp_path, plan().replace(old, new, 1))
     with pytest.raises(ht.InputError, match=message) as refused:
-        ht.run(tmp_path / "plan.toml", out=tmp_path / "out")
+        ht.run(file, out=tmp_path / "out")
     assert "'tilted'" in str(refused.value)
     assert not (tmp_path / "out").exists()
 
 
 def test_a_plan_reads_the_body_exactly(tmp_path: Path) -> None:
-    task = next(iter(tasks_of(tmp_path, plan(integrator="heyoka", precision="double", attitude="false"))))
+    task = next(iter(tasks_of(tmp_path, plan(attitude=False))))
     assert task.case is not None
     assert task.case.body is not None
     assert task.case.body.tensor[0] == (Fraction(7, 10), Fraction(1, 10), Fraction(-1, 20))
     assert sum(g * g for g in task.case.start.gamma) == 1
 
 
-GROWTH = """name = "laws"
-[[measure]]
-kind = "growth"
-cases = ["lagrange"]
-runs = [
-    { precision = "double", horizon = "1e4", starts = 8, samples = 8, decades = 3, attitude = true },
-    { precision = "double", horizon = "1e4", starts = 8, samples = 8, decades = 3, attitude = true, bias = "1e-9" },
-]
-"""
+LONG = {"precision": "double", "horizon": "1e4", "starts": 8, "samples": 8, "decades": 3, "attitude": True}
 
 
 @pytest.mark.slow
 def test_the_errors_of_attitude_and_position_have_laws(tmp_path: Path) -> None:
-    (tmp_path / "plan.toml").write_text(GROWTH, "utf-8")
-    plain, biased = ht.run(tmp_path / "plan.toml", out=tmp_path / "out", workers=1).rows
+    growth = asked("growth", "lagrange", runs=[LONG, LONG | {"bias": "1e-9"}])
+    plain, biased = ht.run(plan_file(tmp_path, growth), out=tmp_path / "out", workers=1).rows
     for name in ("attitude_error", "position_error"):
         law = plain.laws[name]
         assert law.low <= 1.5 <= law.high  # rounding noise that adds up to a phase

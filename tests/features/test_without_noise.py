@@ -8,27 +8,17 @@ from pathlib import Path
 import pytest
 
 import heavytop as ht
+from support.reports import drift, plan_file, table
 
-PLAN = """name = "p"
-[[sweep]]
-kind = "random"
-name = "many"
-count = 3
-seed = 5
-[[measure]]
-kind = "drift"
-cases = ["sweep:many"]
-runs = [{{ precision = "double", horizon = "10", samples = 10 }}]
-noise = {noise}
-"""
+SWEEP = table("sweep", kind="random", name="many", count=3, seed=5)
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("noise")
-    for noise in ("true", "false"):
-        (folder / "plan.toml").write_text(PLAN.format(noise=noise), "utf-8")
-        ht.run(folder / "plan.toml", out=folder / noise, workers=1)
+    for noise in (True, False):
+        plan = plan_file(folder, SWEEP + drift("sweep:many", runs=[("double", "10", 10)], noise=noise))
+        ht.run(plan, out=folder / str(noise).lower(), workers=1)
     return folder
 
 

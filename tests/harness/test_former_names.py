@@ -21,16 +21,15 @@ from heavytop.report.store.store import DIGEST, FILE
 from support import in_process
 from support.helpers import START, TOP
 from support.helpers import options as words
-from support.reports import compare, drift, plan_of, read_plan, store
+from support.reports import asked, compare, drift, plan_of, read_plan, store
 
 pytestmark = pytest.mark.slow
 
 
 def plan(folder: Path, name: str) -> str:
-    work = '[[measure]]\nkind = "work_precision"\ncases = ["euler"]\nhorizon = "1"\nladders = [{ integrator = '
+    work = asked("work_precision", "euler", horizon="1", ladders=[{"integrator": name, "tolerances": ["1e-9"]}])
     file = folder / f"{name}.toml"
-    tables = f'{drift("euler", integrator=name)}{work}"{name}", tolerances = ["1e-9"] }}]\n'
-    file.write_text(f'name = "tiny"\n{tables}', "utf-8")
+    file.write_text(f'name = "tiny"\n{drift("euler", integrator=name)}{work}', "utf-8")
     return str(file)
 
 

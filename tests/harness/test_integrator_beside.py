@@ -13,30 +13,17 @@ from heavytop.harness.checkpoint import Saved
 from heavytop.harness.plan import read
 from heavytop.harness.rows import measure as measured
 from heavytop.report.render.text import failed
-from support.reports import drift, measure, plan_file
+from support.reports import asked, drift, measure, plan_file
 
-OTHERS = """[[measure]]
-kind = "homoclinic"
-cases = ["delone"]
-precisions = ["double"]
-directions = ["forward"]
-[[measure]]
-kind = "local_error"
-cases = ["euler"]
-precisions = ["double"]
-horizon = "2"
-[[measure]]
-kind = "work_precision"
-cases = ["euler"]
-horizon = "4"
-samples = 4
-ladders = [{ integrator = "heyoka", tolerances = ["1e-6", "eps"] }, { integrator = "splitting:2", steps = ["1/9"] }]
-"""
-GROWTH = """[[measure]]
-kind = "growth"
-cases = ["euler"]
-runs = [{ precision = "double", horizon = "4", starts = 8, samples = 4, decades = 1 }]
-"""
+LADDERS = [{"integrator": "heyoka", "tolerances": ["1e-6", "eps"]}, {"integrator": "splitting:2", "steps": ["1/9"]}]
+OTHERS = (
+    asked("homoclinic", "delone", precisions=["double"], directions=["forward"])
+    + asked("local_error", "euler", precisions=["double"], horizon="2")
+    + asked("work_precision", "euler", horizon="4", samples=4, ladders=LADDERS)
+)
+GROWTH = asked(
+    "growth", "euler", runs=[{"precision": "double", "horizon": "4", "starts": 8, "samples": 4, "decades": 1}]
+)
 
 
 @pytest.fixture

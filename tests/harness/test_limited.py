@@ -19,7 +19,7 @@ from heavytop.features.kinds import KINDS
 from heavytop.guard import how_it_ended, stopwatch
 from heavytop.harness.limited import RowLimits, in_limited_process
 from heavytop.harness.plan import read
-from support.helpers import START, TOP, is_running, wait_until, without_progress
+from support.helpers import START, TOP, gone, is_running, running, wait_until, without_progress
 from support.in_process import heavytop
 from support.midpoint import MIDPOINT
 from support.reports import all_good, drift, plan_file, rows
@@ -77,22 +77,6 @@ def plan(folder: Path, *names: str, cases: tuple[str, ...] = ("euler",)) -> Path
     head += "".join(TABLE.format(name=name, python=sys.executable, program=PROGRAM) for name in programs)
     tables = [drift(*cases, integrator=name, runs=[("double", "2", 4)]) for name in names]
     return Path(plan_file(folder, head + "".join(tables)))
-
-
-def running(*words: str) -> list[str]:
-    found = []
-    for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            line = (folder / "cmdline").read_bytes().decode(errors="replace").split("\0")
-        except OSError:
-            continue
-        if all(word in line for word in words):
-            found.append(folder.name)
-    return found
-
-
-def gone(*words: str) -> bool:
-    return wait_until(lambda: not running(*words))
 
 
 @pytest.mark.slow

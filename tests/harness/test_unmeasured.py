@@ -10,22 +10,12 @@ from heavytop.measure import truth
 from heavytop.report.compare.noise import Policy
 from support.helpers import without_progress
 from support.in_process import heavytop
-from support.reports import all_good, compare, drift, plan_file, replace, rows, store, tasks_of
+from support.reports import all_good, asked, compare, drift, plan_file, replace, rows, store, table, tasks_of
 
 PLAN = drift("euler", runs=[("double", "5", 5)])
-FAR = """[[measure]]
-kind = "claim_model"
-cases = ["ershkov-partial-2"]
-times = ["1", "1e100"]
-directions = ["backward"]
-grid = 1
-[[measure]]
-kind = "claim_evaluation"
-cases = ["ershkov-partial-2"]
-precisions = ["double"]
-rate_times = ["1", "1e100"]
-directions = ["forward"]
-"""
+CASE, TIMES = "ershkov-partial-2", ["1", "1e100"]
+FAR = asked("claim_model", CASE, times=TIMES, directions=["backward"], grid=1)
+FAR += asked("claim_evaluation", CASE, precisions=["double"], rate_times=TIMES, directions=["forward"])
 
 
 @pytest.mark.slow
@@ -75,17 +65,17 @@ def test_a_contradiction_is_the_outcome_of_its_row_alone(tmp_path: Path, monkeyp
 
 
 def test_steps_of_a_top_at_rest_are_out_of_reach(tmp_path: Path) -> None:
-    rest = '[[top]]\nname = "rest"\ninertia = [3, 2, 1]\nweight = 1\ncentre = [0, 0, 1]\nomega = [0, 0, 0]\n'
-    steps = '[[measure]]\nkind = "local_error"\ncases = ["rest"]\nprecisions = ["double"]\nhorizon = "1"\n'
-    ((_, row),) = rows(tasks_of(tmp_path, f"{rest}gamma = [0, 0, 1]\n{steps}"), 1, None)
+    up = [0, 0, 1]
+    rest = table("top", name="rest", inertia=[3, 2, 1], weight=1, centre=up, omega=[0, 0, 0], gamma=up)
+    steps = asked("local_error", "rest", precisions=["double"], horizon="1")
+    ((_, row),) = rows(tasks_of(tmp_path, rest + steps), 1, None)
     assert (row.outcome, row.metrics) == ("out_of_reach", {})
     assert row.against == "nothing: rest is an equilibrium, which takes no steps."
 
 
 def test_a_peer_that_gives_up_is_no_failure_but_a_row_that_came_to_nothing_is_one(tmp_path: Path) -> None:
-    schedule = '[[measure]]\nkind = "work_precision"\ncases = ["euler"]\nhorizon = "5"\n'
-    schedule += 'ladders = [{ integrator = "heyoka", tolerances = ["eps"] }]\n'
-    (task,) = tasks_of(tmp_path, schedule)
+    ladders = [{"integrator": "heyoka", "tolerances": ["eps"]}]
+    (task,) = tasks_of(tmp_path, asked("work_precision", "euler", horizon="5", ladders=ladders))
     row = unmeasured(task, OutOfReach("Nothing is known there."))
     assert row.identity[1:] == ("euler/T=5", "heyoka tolerance=eps", ())
     assert (row.measure, row.system, row.precision) == ("work_precision", "heavy_top", "double")
@@ -94,8 +84,8 @@ def test_a_peer_that_gives_up_is_no_failure_but_a_row_that_came_to_nothing_is_on
 
 
 def test_what_only_measuring_shows_to_be_impossible_names_the_row(tmp_path: Path) -> None:
-    sweep = '[[sweep]]\nkind = "grid"\nname = "g"\ninertia = ["3", "2", "2"]\nweight = ["1", "1e-400"]\n'
-    upright = "".join(f'{key} = ["0", "0", "1"]\n' for key in ("centre", "omega", "gamma"))
-    tasks = tasks_of(tmp_path, sweep + upright + drift("sweep:g"))
+    upright = {key: ["0", "0", "1"] for key in ("centre", "omega", "gamma")}
+    sweep = table("sweep", kind="grid", name="g", inertia=["3", "2", "2"], weight=["1", "1e-400"], **upright)
+    tasks = tasks_of(tmp_path, sweep + drift("sweep:g"))
     with pytest.raises(InputError, match=r"^drift g\[1\] double: 1E-400 is outside the exponent range of double"):
         list(rows(tasks, 1, None))

@@ -29,7 +29,7 @@ from heavytop.integrate.registry import commands_in, named, of_callable
 from heavytop.precision import exact, number
 from heavytop.written_numbers import number as written
 from support import methods_with_memory as memory
-from support.helpers import judged
+from support.helpers import gone, judged, running, wait_until
 
 PROGRAM = Path(__file__).parents[1] / "support" / "faulty_program.py"
 CASE = CASES["generic"]
@@ -97,31 +97,11 @@ def program(fault: str = "", **changes: object) -> Command:
     return Command(**{"name": "rk4", "command": line, "setting": "step", "order": 4} | changes)
 
 
-def processes(fault: str) -> list[str]:
-    """Command lines of the processes that run the program with that fault."""
-    found = []
-    for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            words = (folder / "cmdline").read_bytes().split(b"\0")
-        except OSError:
-            continue
-        if str(PROGRAM).encode() in words and (not fault or fault.split()[-1].encode() in words):
-            found.append(f"{folder.name} {words}")
-    return found
-
-
-def gone(fault: str) -> bool:
-    end = monotonic() + 5
-    while processes(fault) and monotonic() < end:
-        sleep(0.02)
-    return not processes(fault)
-
-
 @pytest.fixture(autouse=True)
 def _nothing_is_left() -> Iterator[None]:
     yield
     commands.close_all()
-    assert gone("")
+    assert gone(str(PROGRAM))
 
 
 @pytest.mark.slow
@@ -137,7 +117,7 @@ def test_a_faulty_program_fails_with_its_reason_and_leaves_no_process(fault: str
     assert len(caught.value.cause) < 500
     assert caught.value.cause.isprintable()
     commands.close_all()
-    assert gone(fault)
+    assert gone(str(PROGRAM))
     assert fault not in SILENT or monotonic() - began < 10
 
 
@@ -202,7 +182,7 @@ def test_a_program_integrates_whatever_else_it_does(fault: str) -> None:
     assert run.flags == {"step": f"{0.02:.17g}"}
     assert run.seconds["run"] > 0
     commands.close_all()
-    assert gone(fault or "faulty_program.py")
+    assert gone(str(PROGRAM))
 
 
 @pytest.mark.slow
@@ -433,13 +413,11 @@ def test_the_program_ends_with_this_process_however_that_ends(tmp_path: Path, en
     data = ["--inertia", "3,2,1", "--weight", "1", "--centre", "0,0,1/2", "--omega", "1,0,1", "--gamma", "0,0,1"]
     line = [sys.executable, "-m", "heavytop", "propagate", *data, "--times", "1", "--integrator", str(path)]
     with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as parent:
-        wait = monotonic() + 60
-        while not processes(fault) and monotonic() < wait:
-            sleep(0.05)
+        wait_until(lambda: running(str(PROGRAM), fault.split()[-1]), 60)
         sleep(0.2)
         os.kill(parent.pid, end)
         parent.wait(30)
-    assert gone(fault)
+    assert gone(str(PROGRAM))
 
 
 @pytest.mark.slow

@@ -21,7 +21,6 @@ from heavytop.features.local_error.kind import _said
 from heavytop.features.work_precision.kind import WorkPrecisionTable
 from heavytop.harness import integrator_check
 from heavytop.harness.checkpoint import Saved
-from heavytop.harness.plan import read
 from heavytop.harness.rows import Task, computed, measure
 from heavytop.integrate import registry
 from heavytop.integrate.peers.command import Command, close_all
@@ -32,6 +31,7 @@ from heavytop.records import Row, RowKey
 from heavytop.top.attitude import perpendicular
 from support import methods_with_memory as memory
 from support.helpers import judged
+from support.reports import asked, tasks_of
 
 pytestmark = pytest.mark.slow
 FOLDER = Path(__file__).parents[1] / "support"
@@ -127,11 +127,8 @@ def test_work_against_precision_takes_restarts_at_samples_for_what_they_are(tmp_
     """
     module = FOLDER / "methods_with_memory.py"
     (tmp_path / "mine.py").write_text(module.read_text("utf-8"))
-    (tmp_path / "plan.toml").write_text(
-        'name = "p"\n[[measure]]\nkind = "work_precision"\ncases = ["lagrange"]\nhorizon = "2"\nsamples = 20\n'
-        'ladders = [{ integrator = "./mine.py:ab4_declared", steps = ["1/10", "1/20", "1/40"] }]\n'
-    )
-    tasks = read(str(tmp_path / "plan.toml"), KINDS)[2]
+    ladders = [{"integrator": "./mine.py:ab4_declared", "steps": ["1/10", "1/20", "1/40"]}]
+    tasks = tasks_of(tmp_path, asked("work_precision", "lagrange", horizon="2", samples=20, ladders=ladders))
     rows = [measure(KINDS["work_precision"], task, Saved()) for task in tasks]
     assert [each.outcome for each in rows] == ["success"] * 3, [each.reference.reason for each in rows]
     text = "\n".join(str(block) for block in KINDS["work_precision"].document(rows))

@@ -21,7 +21,7 @@ from heavytop.records import Report
 from heavytop.report.compare.noise import Policy
 from heavytop.report.render.export import comparison_junit
 from support.helpers import named_peers, run_peer, without_progress
-from support.reports import all_good, compare, expand, html, load, measure, plan_of
+from support.reports import all_good, asked, compare, expand, html, load, measure, plan_file, plan_of
 
 CASE = CASES["euler"]
 TIMES = [Fraction(1, 2), Fraction(2)]
@@ -148,10 +148,8 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def plan(folder: Path, *names: str) -> Path:
-    ladders = ", ".join(f'{{ integrator = "{name}", tolerances = ["1e-9"] }}' for name in names)
-    text = 'name = "p"\n[[measure]]\nkind = "work_precision"\ncases = ["euler"]\nhorizon = "2"\nsamples = 2\n'
-    (folder / "plan.toml").write_text(f"{text}ladders = [{ladders}]\n", "utf-8")
-    return folder / "plan.toml"
+    ladders = [{"integrator": name, "tolerances": ["1e-9"]} for name in names]
+    return Path(plan_file(folder, asked("work_precision", "euler", horizon="2", samples=2, ladders=ladders)))
 
 
 @pytest.mark.slow

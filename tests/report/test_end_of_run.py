@@ -202,7 +202,3 @@ def test_a_card_has_its_title_alone_on_a_line_and_nothing_is_cut() -> None:
 def test_rows_that_are_not_supported_are_not_finished() -> None:
     rows = [row(), row(case="lagrange", outcome="unsupported", metrics={}, reference=Against("none", reason="no"))]
     assert "Plan p: 2 measurements, 1 finished, 1 not supported." in said(*rows)
-
-
-def test_one_measurement_is_no_plural() -> None:
-    assert said(row())[0] == "Plan p: 1 measurement, all finished."

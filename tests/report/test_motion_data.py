@@ -16,7 +16,7 @@ from heavytop.harness.rows import data_of
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.precision import DOUBLE, exact
 from heavytop.records import Data, Law, Quantity, Row, Series
-from support.reports import drift, measure, replace, rows, store, tasks_of
+from support.reports import asked, drift, measure, replace, rows, store, table, tasks_of
 from support.small_reports import judged, report, row
 
 DATA = Data(("3", "2", "1/3"), "3/2", ("0", "1/5", "-1"), ("1/10", "0", "9/10"), ("3/5", "0", "-4/5"))
@@ -128,8 +128,8 @@ def test_a_series_and_a_law_are_of_the_quantity_that_they_were(part: str) -> Non
 
 def own_top(centre: str, omega: str) -> str:
     """A plan of the drift of one's own top."""
-    data = f'centre = [0, 0, "{centre}"]\nomega = ["1/10", 0, "{omega}"]\ngamma = ["3/5", 0, "4/5"]\n'
-    return f'[[top]]\nname = "mine"\ninertia = [3, 2, 1]\nweight = 1\n{data}{drift("mine")}'
+    data = {"centre": [0, 0, centre], "omega": ["1/10", 0, omega], "gamma": ["3/5", 0, "4/5"]}
+    return table("top", name="mine", inertia=[3, 2, 1], weight=1, **data) + drift("mine")
 
 
 @pytest.mark.slow
@@ -153,9 +153,8 @@ def test_numbers_of_any_length_are_written_and_read(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_every_row_of_a_motion_has_its_data_those_of_ensembles_too(tmp_path: Path) -> None:
-    run = '{ precision = "double", horizon = "1", samples = 4, decades = 1, starts = 8 }'
-    ensemble = f'[[measure]]\nkind = "growth"\ncases = ["mine"]\nruns = [{run}]\n'
-    tasks = tasks_of(tmp_path, own_top("1/2", "9/10") + ensemble)
+    run = {"precision": "double", "horizon": "1", "samples": 4, "decades": 1, "starts": 8}
+    tasks = tasks_of(tmp_path, own_top("1/2", "9/10") + asked("growth", "mine", runs=[run]))
     found = [each for _, each in sorted(rows(tasks, 1), key=itemgetter(0))]
     assert [(each.starts, each.data) for each in found] == [
         (starts, Data(("3", "2", "1"), "1", ("0", "0", "1/2"), ("1/10", "0", "9/10"), ("3/5", "0", "4/5")))

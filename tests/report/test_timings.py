@@ -9,7 +9,7 @@ from heavytop.features.work_precision import kind as work_precision
 from heavytop.measure.integrator import Repeats
 from heavytop.records import Row
 from heavytop.report.compare.noise import Policy, Rule, Timings
-from support.reports import compare, measure, replace, store, tasks_of
+from support.reports import asked, compare, measure, replace, store, tasks_of
 from support.small_reports import report, row
 
 ENVIRONMENT = {
@@ -105,13 +105,8 @@ def test_a_fastest_run_slower_than_the_median_is_refused(tmp_path: Path) -> None
         store.read(store.write(report(bad), tmp_path))
 
 
-PLAN = """[[measure]]
-kind = "work_precision"
-cases = ["euler"]
-horizon = "20"
-samples = 4
-ladders = [{ integrator = "heyoka", tolerances = ["1e-6"] }]
-"""
+LADDERS = [{"integrator": "heyoka", "tolerances": ["1e-6"]}]
+PLAN = asked("work_precision", "euler", horizon="20", samples=4, ladders=LADDERS)
 
 
 def ran(folder: Path, more: str) -> Row:

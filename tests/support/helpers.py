@@ -189,6 +189,24 @@ def wait_until(condition: Callable[[], object], seconds: float = 20, nap: float 
     return bool(met)
 
 
+def running(*words: str) -> list[str]:
+    """The processes whose command lines hold all of these words."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            line = (folder / "cmdline").read_bytes().decode(errors="replace").split("\0")
+        except OSError:
+            continue
+        if all(word in line for word in words):
+            found.append(folder.name)
+    return found
+
+
+def gone(*words: str) -> bool:
+    """Whether there is no such process any more, soon."""
+    return wait_until(lambda: not running(*words))
+
+
 def is_running(process: int) -> bool:
     """Whether a process runs: one that was killed may wait for its parent to notice."""
     try:

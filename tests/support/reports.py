@@ -57,10 +57,24 @@ def tasks_of(folder: Path, text: str) -> Any:
 
 def drift(*cases: str, runs: Iterable[tuple[str, str, int]] = (("double", "2", 3),), **more: object) -> str:
     """A table of a plan in TOML: the drift of cases in runs of a precision, a horizon and so many samples each."""
-    each = ", ".join(f'{{ precision = "{p}", horizon = "{end}", samples = {count} }}' for p, end, count in runs)
-    keys = {"kind": "drift", "cases": cases} | more
-    lines = [f"{key} = {json.dumps(value)}" for key, value in keys.items()]
-    return "\n".join(["[[measure]]", *lines, f"runs = [{each}]"]) + "\n"
+    each = [{"precision": p, "horizon": end, "samples": count} for p, end, count in runs]
+    return asked("drift", *cases, **more, runs=each)
+
+
+def asked(kind: str, /, *cases: str, **keys: object) -> str:
+    """A table of a plan in TOML: what is measured of cases."""
+    return table("measure", kind=kind, cases=cases, **keys)
+
+
+def table(name: str, /, **keys: object) -> str:
+    """A table of an array of tables in TOML, each key on a line."""
+    return "".join([f"[[{name}]]\n", *(f"{key} = {in_toml(value)}\n" for key, value in keys.items())])
+
+
+def in_toml(value: object) -> str:
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{key} = {in_toml(part)}' for key, part in value.items())} }}"
+    return f"[{', '.join(map(in_toml, value))}]" if isinstance(value, list | tuple) else json.dumps(value)
 
 
 store = SimpleNamespace(

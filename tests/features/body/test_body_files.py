@@ -415,12 +415,26 @@ def of_class(sequence: str) -> tuple[str, str]:
 
 BEGIN = "0.1 0 0.2 2.5 0.31 0.28 0.19 9.81"
 ARM = f"{BEGIN} 0.05 -0.02 0.04"
-WEIGHTLESS = '<gazebo reference="arm"><{0}>{1}</{0}></gazebo></robot>'
+MOMENTS = "2 0.03 0.05 0.04"
+CARRIED = f"0.1 0 0.2 {MOMENTS}"
+BALANCED = '<compiler balanceinertia="true"/>'
 SCENE = (
     '#usda 1.0\n(\n metersPerUnit = 0.01\n)\ndef "s" {{\n physics:gravityMagnitude = {}\n}}\n'
     'def "a" {{\n physics:mass = 2\n'
-    " physics:diagonalInertia = (300, 500, 400)\n /* physics:mass = 3 */\n {} = (10, 0, 20)\n}}\n"
+    " physics:diagonalInertia = (300, 500, 400)\n /* physics:mass = 3 */\n {}physics:centerOfMass = (10, 0, 20)\n}}\n"
 )
+
+
+def in_usd(gravity: str, lines: str) -> tuple[str, str]:
+    """2 kg with this magnitude of gravity in its scene, and these lines before its centre of mass."""
+    return "usda", SCENE.format(gravity, lines)
+
+
+def in_gazebo(name: str, value: str) -> tuple[str, str]:
+    element = f'<gazebo reference="arm"><{name}>{value}</{name}></gazebo></robot>'
+    return "urdf", urdf(SIX).replace("</robot>", element)
+
+
 INCLUDED = mjcf(SIX).replace("mujoco>", "mujocoinclude>").replace("<worldbody>", "").replace("</worldbody>", "")
 ENCODED = '<?xml version="1.0" encoding="{}"?><!-- \xe9 -->' + urdf(SIX)
 TURNED = urdf(SIX).replace('rpy="0 0 0"', 'quat_xyzw="0 0 1 0" x:note="1"').replace("<robot", '<robot xmlns:x="x"')
@@ -445,50 +459,35 @@ READ: dict[str, tuple[tuple[str, str | bytes], str]] = {
     "angles about turned axes": (of_class("zyx"), "0 0 1 1 2 1.5 3 9.81"),
     "angles about fixed axes": (of_class("ZYX"), "0 0 1 1 1.5 3 2 9.81"),
     "bounds": (in_mjcf(BALL, '<compiler boundmass="5" boundinertia=".045"/>'), "0.1 0 0.2 5 0.045 0.05 0.045 9.81"),
-    "balanced": (
-        in_mjcf(BALL.replace("0.04", "0.1"), '<compiler balanceinertia="true"/>'),
-        "0.1 0 0.2 2 0.06 0.06 0.06 9.81",
-    ),
-    "not balanced": (in_mjcf(BALL, '<compiler balanceinertia="true"/>'), "0.1 0 0.2 2 0.03 0.05 0.04 9.81"),
+    "balanced": (in_mjcf(BALL.replace("0.04", "0.1"), BALANCED), "0.1 0 0.2 2 0.06 0.06 0.06 9.81"),
+    "not balanced": (in_mjcf(BALL, BALANCED), f"{CARRIED} 9.81"),
     "joint in a frame": (
         in_mjcf(f'<frame pos="0 0 1"><joint type="ball"/></frame>{BALL}'),
-        "0.1 0 -0.8 2 0.03 0.05 0.04 9.81",
+        f"0.1 0 -0.8 {MOMENTS} 9.81",
     ),
     "inertial in a frame": (in_mjcf(FRAMED), "0 0.1 1.2 2 0.05 0.03 0.04 9.81"),
-    "gravity": (in_mjcf(BALL, '<option gravity="0 0 -1.62"/>'), "0.1 0 0.2 2 0.03 0.05 0.04 1.62"),
-    "no gravity": (in_mjcf(BALL, '<option><flag gravity="disable"/></option>'), "0.1 0 0.2 2 0.03 0.05 0.04 0"),
+    "gravity": (in_mjcf(BALL, '<option gravity="0 0 -1.62"/>'), f"{CARRIED} 1.62"),
+    "no gravity": (in_mjcf(BALL, '<option><flag gravity="disable"/></option>'), f"{CARRIED} 0"),
     "degrees": (in_sdf('degrees="1"', "90 90 0"), "0.1 0 0.2 2 0.05 0.04 0.03 9.81"),
-    "ball": (in_sdf(joint=JOINT.format("arm", "")), "0.1 0 0.7 2 0.03 0.05 0.04 9.81"),
-    "ball in the model": (
-        in_sdf(joint=JOINT.format("arm", 'relative_to="f"')),
-        "0.1 0 1.7 2 0.03 0.05 0.04 9.81",
-    ),
-    "ball of a frame": (in_sdf(joint=JOINT.format("g", "")), "-0.9 0 0.7 2 0.03 0.05 0.04 9.81"),
-    "moon": (in_sdf(gravity="<gravity>0 0 -1.62</gravity>"), "0.1 0 0.2 2 0.03 0.05 0.04 1.62"),
-    "world": (in_sdf(gravity="<gui/>"), "0.1 0 0.2 2 0.03 0.05 0.04 9.8"),
-    "moon of SDF 1.4": (
-        in_sdf(gravity="<physics><gravity>0 0 -1.62</gravity></physics>"),
-        "0.1 0 0.2 2 0.03 0.05 0.04 1.62",
-    ),
+    "ball": (in_sdf(joint=JOINT.format("arm", "")), f"0.1 0 0.7 {MOMENTS} 9.81"),
+    "ball in the model": (in_sdf(joint=JOINT.format("arm", 'relative_to="f"')), f"0.1 0 1.7 {MOMENTS} 9.81"),
+    "ball of a frame": (in_sdf(joint=JOINT.format("g", "")), f"-0.9 0 0.7 {MOMENTS} 9.81"),
+    "moon": (in_sdf(gravity="<gravity>0 0 -1.62</gravity>"), f"{CARRIED} 1.62"),
+    "world": (in_sdf(gravity="<gui/>"), f"{CARRIED} 9.8"),
+    "moon of SDF 1.4": (in_sdf(gravity="<physics><gravity>0 0 -1.62</gravity></physics>"), f"{CARRIED} 1.62"),
     "moon in USD, beside names of other programs": (
-        ("usda", SCENE.format('162\n string paths = "/s/*/a"', "float user:Mass = 3\n physics:centerOfMass")),
-        "0.1 0 0.2 2 0.03 0.05 0.04 1.62",
+        in_usd('162\n string paths = "/s/*/a"', "float user:Mass = 3\n "),
+        f"{CARRIED} 1.62",
     ),
     "a shape within a body of USD": (
-        ("usda", SCENE.format("162", 'def "c" (doc = "{") {\n physics:mass = 7\n}\n physics:centerOfMass')),
-        "0.1 0 0.2 2 0.03 0.05 0.04 1.62",
+        in_usd("162", 'def "c" (doc = "{") {\n physics:mass = 7\n}\n '),
+        f"{CARRIED} 1.62",
     ),
-    "earth in USD": (("usda", SCENE.format("-inf", "physics:centerOfMass")), "0.1 0 0.2 2 0.03 0.05 0.04 9.81"),
-    "no gravity in USD": (
-        ("usda", SCENE.format("162", "physxRigidBody:disableGravity = 1\n physics:centerOfMass")),
-        "0.1 0 0.2 2 0.03 0.05 0.04 0",
-    ),
-    "no gravity in Gazebo": (
-        ("urdf", urdf(SIX).replace("</robot>", WEIGHTLESS.format("turnGravityOff", "true"))),
-        ARM.replace("9.81", "0"),
-    ),
-    "gravity in Gazebo": (("urdf", urdf(SIX).replace("</robot>", WEIGHTLESS.format("gravity", "1"))), ARM),
-    "exempt": (in_sdf(exempt="<gravity>0</gravity>"), "0.1 0 0.2 2 0.03 0.05 0.04 0"),
+    "earth in USD": (in_usd("-inf", ""), f"{CARRIED} 9.81"),
+    "no gravity in USD": (in_usd("162", "physxRigidBody:disableGravity = 1\n "), f"{CARRIED} 0"),
+    "no gravity in Gazebo": (in_gazebo("turnGravityOff", "true"), ARM.replace("9.81", "0")),
+    "gravity in Gazebo": (in_gazebo("gravity", "1"), ARM),
+    "exempt": (in_sdf(exempt="<gravity>0</gravity>"), f"{CARRIED} 0"),
 }
 
 
@@ -536,10 +535,7 @@ REFUSED = {
     "geoms alone": (in_mjcf('<geom size="1"/>'), "saveLastXML"),
     "fullinertia turned": (("xml", mjcf(SIX).replace("<inertial ", '<inertial quat="1 0 0 0" ')), "contradict"),
     "auto": (("sdf", sdf(SIX).replace("<inertial>", '<inertial auto="true">')), "expand-auto-inertials"),
-    "not symmetric": (
-        ("toml", "mass = 1\ncentre = [0, 0, 0]\ninertia = [[1, 2, 0], [0, 1, 0], [0, 0, 1]]"),
-        "symmetric",
-    ),
+    "not symmetric": (("toml", "mass = 1\ninertia = [[1, 2, 0], [0, 1, 0], [0, 0, 1]]"), "symmetric"),
     "no word on the point": (("toml", "mass = 1\ncentre = [1, 0, 0]\ninertia = [1, 1, 1]"), "about"),
     "a tensor of zeros": (
         ("usda", '#usda 1.0\ndef "a" {\n physics:mass = 1\n physics:diagonalInertia = (0, 0, 0)\n}'),
@@ -553,17 +549,14 @@ REFUSED = {
     "Value": (leg("value=", "Value="), "unknown attribute Value of <mass>"),
     "auto of URDF": (leg("<inertial>", '<inertial auto="true">'), "unknown attribute auto of <inertial>"),
     "Origin": (leg("<origin", "<Origin"), "unknown element Origin of <inertial>"),
-    "rpy and quat_xyzw": (
-        leg('xyz="0.1 0 0.2"', 'rpy="0 0 0" quat_xyzw="0 0 0 1"'),
-        "origin has both rpy and quat_xyzw",
-    ),
+    "rpy and quat_xyzw": (leg('xyz="0.1 0 0.2"', 'rpy="0 0 0" quat_xyzw="0 0 0 1"'), "has both rpy and quat_xyzw"),
     "gravty": (in_mjcf(BALL, '<option gravty="0 0 -1.62"/>'), "<option>: unknown gravty.\n  Did you mean gravity?"),
     "Disable": (in_mjcf(BALL, '<option><flag gravity="Disable"/></option>'), "enable or disable; got 'Disable'"),
     "xyzz": (of_class("xyzz"), "three of the letters x y z X Y Z; got 'xyzz'"),
     "radians": (in_mjcf(BALL, '<compiler angle="radians"/>'), "degree or radian; got 'radians'"),
     "settotalmas": (in_mjcf(BALL, '<compiler settotalmas="5"/>'), "Did you mean settotalmass?"),
     "armature": (in_mjcf(f'<joint type="ball" armature="1"/>{BALL}'), "armature of its ball joint"),
-    "centreOfMass": (("usda", SCENE.format("9.81", "physics:centreOfMass")), "Did you mean centerOfMass?"),
+    "centreOfMass": (("usda", in_usd("9.81", "")[1].replace("centerO", "centreO")), "Did you mean centerOfMass?"),
     "gravty of SDF": (in_sdf(gravity="<gravty>0 0 -1.62</gravty>"), "<world>: unknown gravty"),
     "Ixz of SDF": (("sdf", sdf(SIX).replace("ixz>", "Ixz>")), "unknown element Ixz of <inertia>"),
     "degree": (in_sdf('degree="true"'), "unknown attribute degree of <pose>"),
@@ -580,14 +573,8 @@ REFUSED = {
     "a bound": (("xml", mjcf(SIX).replace("<world", '<compiler boundinertia=".2"/><world')), "boundinertia"),
     "global": (in_mjcf(BALL, '<compiler coordinate="global"/>'), "MuJoCo 2.3.3"),
     "fused": (in_mjcf(BALL, '<compiler fusestatic="true"/>'), "fusestatic"),
-    "y up in USD": (
-        ("usda", SCENE.format("9.81", "physics:centerOfMass").replace("(", '(\n upAxis = "Y"', 1)),
-        "along -z; got 0, -0.0981, 0",
-    ),
-    "x down in USD": (
-        ("usda", SCENE.format("1\n physics:gravityDirection = (2, 0, 0)", "physics:centerOfMass")),
-        "along -z; got 0.01, 0, 0",
-    ),
+    "y up in USD": (("usda", in_usd("9.81", "")[1].replace("(", '(\n upAxis = "Y"', 1)), "along -z; got 0, -0.0981, 0"),
+    "x down in USD": (in_usd("1\n physics:gravityDirection = (2, 0, 0)", ""), "along -z; got 0.01, 0, 0"),
     "gravity along y": (in_mjcf(BALL, '<option gravity="0 -9.81 0"/>'), "--gravity"),
     "no boolean": (in_sdf('degrees="yes"'), "degrees must be true or false; got 'yes'"),
     "quaternion": (in_sdf('rotation_format="quat_xyzw" degrees="true"', "0 0 0 1"), "without degrees"),

@@ -24,6 +24,7 @@ from heavytop.precision import DOUBLE
 from heavytop.top.bodies import CENTRE, Body
 from heavytop.top.inertia_slips import MassProperties
 from support.in_process import heavytop
+from support.reports import asked, drift, plan_file, table
 
 ADAPTERS = Path(ht.__file__).parent / "features" / "engines" / "adapters"
 PACKAGES = {"mujoco": "mujoco", "pinocchio": "pinocchio", "exudyn": "exudyn"}
@@ -177,51 +178,27 @@ def test_an_unknown_engine_is_refused(tmp_path: Path) -> None:
 def test_an_adapter_is_measured_as_its_engine_is(tmp_path: Path) -> None:
     (tmp_path / "engine.py").write_text(STAND_IN)
     (tmp_path / "heavytop_engine.py").write_text((ADAPTERS / "heavytop_engine.py").read_text())
-    (tmp_path / "engine.toml").write_text(
-        '[[integrator]]\nname = "stand-in"\ncommand = ["{python}", "engine.py"]\nsetting = "step"\norder = 4\n'
-        'directions = ["forward"]\nbodies = true\nattitude = "quaternion"\n'
-    )
-    (tmp_path / "plan.toml").write_text(
-        """
-name = "stand-in"
-integrators = ["engine.toml"]
-[[top]]
-name = "body"
-mass = "2"
-gravity = "9.81"
-centre = ["0.3", "-0.2", "0.4"]
-inertia = ["1.2", "0.9", "0.6"]
-about = "centre of mass"
-omega = ["1", "2", "6"]
-quaternion = ["0.8", "0", "0.6", "0"]
-[[measure]]
-kind = "work_precision"
-cases = ["body"]
-attitude = true
-horizon = "1"
-samples = 4
-ladders = [{ integrator = "stand-in", steps = ["1/50", "1/100"] }]
-[[measure]]
-kind = "drift"
-cases = ["body"]
-attitude = true
-noise = false
-step = "1/100"
-integrator = "stand-in"
-runs = [{ precision = "double", horizon = "1", samples = 4 }]
-"""
-    )
-    done = heavytop("run", "--plan", str(tmp_path / "plan.toml"), "--out", str(tmp_path / "out"), "--workers", "1")
+    made = {"name": "stand-in", "command": ["{python}", "engine.py"], "setting": "step", "order": 4}
+    made |= {"directions": ["forward"], "bodies": True, "attitude": "quaternion"}
+    (tmp_path / "engine.toml").write_text(table("integrator", **made))
+    body = {"name": "body", "mass": "2", "gravity": "9.81", "centre": ["0.3", "-0.2", "0.4"]}
+    body |= {"inertia": ["1.2", "0.9", "0.6"], "about": "centre of mass", "omega": ["1", "2", "6"]}
+    ladders = [{"integrator": "stand-in", "steps": ["1/50", "1/100"]}]
+    work = asked("work_precision", "body", attitude=True, horizon="1", samples=4, ladders=ladders)
+    runs = {"noise": False, "step": "1/100", "integrator": "stand-in", "runs": [("double", "1", 4)]}
+    tables = table("top", **body, quaternion=["0.8", "0", "0.6", "0"]) + work + drift("body", attitude=True, **runs)
+    plan = plan_file(tmp_path, f'integrators = ["engine.toml"]\n{tables}')
+    done = heavytop("run", "--plan", plan, "--out", str(tmp_path / "out"), "--workers", "1")
     assert done.returncode == 0, done.stdout + done.stderr
-    coarse, fine, drift = ht.read_report(tmp_path / "out").rows
+    coarse, fine, drifting = ht.read_report(tmp_path / "out").rows
     errors = [float(row.metrics["error_max"]) for row in (coarse, fine)]
     assert 12 < errors[0] / errors[1] < 20
     assert float(fine.metrics["joint_violation_max"]) == pytest.approx(5e-7, rel=1e-6)
     for name in ("attitude_error_max", "position_error_max"):
         assert 0 < float(fine.metrics[name]) < 1e-5
-        assert float(drift.metrics[name]) == pytest.approx(float(fine.metrics[name]), rel=0.1)
-    assert drift.key.subject.step == "1/100"
-    assert drift.key.subject.version == "1"
+        assert float(drifting.metrics[name]) == pytest.approx(float(fine.metrics[name]), rel=0.1)
+    assert drifting.key.subject.step == "1/100"
+    assert drifting.key.subject.version == "1"
 
 
 @pytest.mark.slow

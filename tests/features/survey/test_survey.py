@@ -32,30 +32,16 @@ from heavytop.precision import DOUBLE, exact
 from heavytop.records import SCHEMA, Row
 from heavytop.report.compare.noise import Policy
 from support.in_process import heavytop
-from support.reports import compare
+from support.reports import asked, compare, plan_file, table
 
 pytestmark = pytest.mark.pictures
 
 TIMES = [Fraction(n) for n in (1, 2, 3)]
-SWEEP = """
-[[sweep]]
-kind = "random"
-name = "many"
-seed = 3
-count = {count}
-[[measure]]
-kind = "survey"
-cases = ["sweep:many"]
-horizon = "3"
-samples = 3
-{more}
-"""
 
 
 def plan(folder: Path, count: int = 5, more: str = "") -> Path:
-    file = folder / "plan.toml"
-    file.write_text('name = "many"\n' + SWEEP.format(count=count, more=more))
-    return file
+    sweep = table("sweep", kind="random", name="many", seed=3, count=count)
+    return Path(plan_file(folder, f"{sweep}{asked('survey', 'sweep:many', horizon='3', samples=3)}{more}"))
 
 
 @pytest.mark.slow
