@@ -33,35 +33,22 @@ GRID = {
     "system": "heavy_top",
 }
 DRIFT = {"precision": "double", "horizon": "2", "samples": 4}
-GROWTH = {
-    **{"precision": "double", "horizon": "10", "starts": 6, "seed": 1, "samples": 4, "decades": 2, "tolerance": None},
-    **{"high_accuracy": False, "bias": None, "reference": None, "attitude": False},
-}
+GROWTH = {"precision": "double", "horizon": "10", "starts": 6, "samples": 4, "decades": 2}
+CLAIM = {"cases": ["ershkov-partial-2"], "directions": ["forward"]}
 CURVE = {"integrator": "heyoka", "precision": "double", "tolerances": ["1e-9"], "steps": []}
 BASES: dict[str, dict[str, Any]] = {
     "audit": {"claims": ["ershkov-partial"], "systems": ["gyrostat"]},
-    "claim_evaluation": {
-        **{"cases": ["ershkov-partial-2"], "precisions": ["double"]},
-        **{"rate_times": ["1", "2", "4"], "directions": ["forward"]},
-    },
-    "claim_model": {"cases": ["ershkov-partial-2"], "times": ["1", "2"], "grid": 4, "directions": ["forward"]},
-    "drift": {"cases": ["euler"], "runs": [DRIFT], "integrator": "heyoka", "attitude": False, "noise": False},
-    "growth": {"cases": ["euler"], "runs": [GROWTH], "integrator": "heyoka"},
-    "homoclinic": {
-        **{"cases": ["ershkov-partial-2"], "precisions": ["double"], "samples": 2},
-        **{"directions": ["forward"], "integrator": "heyoka"},
-    },
-    "hunt": {
-        **{"integrator": "heyoka", "precision": "double", "horizon": "1", "budget": 1, "family": "any"},
-        **{"against": "", "limit": "1", "seed": 1, "found": ""},
-    },
-    "local_error": {"cases": ["euler"], "precisions": ["double"], "horizon": "1", "integrator": "heyoka"},
-    "survey": {
-        **{"cases": ["sweep:tops"], "horizon": "2", "precision": "double", "samples": 2},
-        **{"integrator": "heyoka", "tolerance": "", "map": [], "sweep": RANDOM},
-    },
-    "work_precision": {"cases": ["euler"], "horizon": "2", "ladders": [CURVE], "samples": 4, "timings": False},
+    "claim_evaluation": CLAIM | {"precisions": ["double"], "rate_times": ["1", "2", "4"]},
+    "claim_model": CLAIM | {"times": ["1", "2"], "grid": 4},
+    "drift": {"cases": ["euler"], "runs": [DRIFT], "noise": False},
+    "growth": {"cases": ["euler"], "runs": [GROWTH]},
+    "homoclinic": CLAIM | {"precisions": ["double"], "samples": 2},
+    "hunt": {"horizon": "1", "budget": 1, "limit": "1"},
+    "local_error": {"cases": ["euler"], "precisions": ["double"], "horizon": "1"},
+    "survey": {"cases": ["sweep:tops"], "horizon": "2", "samples": 2, "sweep": RANDOM},
+    "work_precision": {"cases": ["euler"], "horizon": "2", "ladders": [CURVE], "samples": 4},
 }
+"""Of each kind a table; what is not named is its default."""
 CHANGES: dict[str, list[dict[str, Any]]] = {
     "audit": [{"claims": ["ershkov-general"]}, {"systems": ["heavy_top"]}],
     "claim_evaluation": [

@@ -96,13 +96,6 @@ def test_a_damaged_file_is_compiled_again_and_replaced(folder: Path, change: str
     assert code_cache.read(file.name) is not None
 
 
-def test_the_code_of_another_name_counts_as_none(folder: Path) -> None:
-    file = kept(folder)
-    other = folder / ("0" * 64)
-    other.write_bytes(file.read_bytes())
-    assert code_cache.read(other.name) is None
-
-
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="the system has no owners of files")
 def test_what_others_may_write_counts_as_none(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = kept(folder)
@@ -134,11 +127,6 @@ def test_the_folder_does_not_grow_without_end(folder: Path, monkeypatch: pytest.
         code_cache.write(str(number), b"code", b"{}")
     assert len([*folder.iterdir()]) == 3
     assert code_cache.read("4") == (b"code", b"{}")
-
-
-def test_signatures_come_back(folder: Path) -> None:
-    first = thrice([])(3)
-    assert thrice([])(3).signatures == first.signatures == {"f": ["void", "double*"]}
 
 
 def test_a_relative_folder_of_caches_is_ignored(monkeypatch: pytest.MonkeyPatch) -> None:

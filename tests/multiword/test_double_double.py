@@ -16,8 +16,7 @@ from heavytop.multiword.problem import Scaled, Status
 from heavytop.top.equations import HEAVY_TOP, Parameters
 from support.words_helpers import machine_of, problem
 
-FINEST, COARSE = Fraction(1, 2**105), Fraction(1, 10**16)
-LADDER = OrderSchedule.of(FINEST)
+LADDER = OrderSchedule.of(Fraction(1, 2**105))
 
 
 @pytest.mark.slow

@@ -99,18 +99,6 @@ def test_a_step_with_units_or_a_slope_that_do_not_fit_is_done_again(spoil, numbe
     assert max(abs(a - b) for a, b in zip(known.state, run.state, strict=True)) < Fraction(1, 2**79)
 
 
-def test_units_out_of_reach_are_not_used() -> None:
-    """Ω is far below what units reach: nothing is split then."""
-    p = Parameters(tuple(map(Fraction, (3, 2, 1))), (Fraction(0), Fraction(0), Fraction(1)), Fraction(0))
-    start = (Fraction(1, 10**140), *(Fraction(0) for _ in range(4)), Fraction(1))
-    split, exact = (Floating(Scaled.of(HEAVY_TOP, p, start), schedule, True) for schedule in (FINE, ALL_PAIRS))
-    for run in (split, exact):
-        assert run.advance(Fraction(20), 10**6) is Status.OK
-    assert split.words[split.layout.units] < 2.0**-400
-    for a, b in zip(split.sample(Fraction(20)), exact.sample(Fraction(20)), strict=True):
-        assert abs(a - b) <= Fraction(1, 2**50) * abs(b)
-
-
 def test_lanes_are_split_as_a_motion_by_itself_is() -> None:
     random = Random(3)
     schedule = OrderSchedule.of(Fraction(1, 2**70), 1.6)

@@ -183,11 +183,6 @@ def test_a_failure_of_another_motion_says_nothing_of_this_one() -> None:
     assert compare(report(row(data=data)), report(ended("failed")), Policy()).exit_code == 1
 
 
-def test_a_row_that_is_no_longer_finite_is_worse() -> None:
-    assert judged(row(), row(finite=False))[0] == "worse"
-    assert judged(row(finite=False), row())[0] == "same"
-
-
 def test_missing_and_new_rows_and_metrics() -> None:
     other = row(case="lagrange")
     result = compare(report(row(), other), report(row()), Policy())

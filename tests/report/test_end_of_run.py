@@ -63,12 +63,6 @@ def test_what_failed_is_named_and_counted() -> None:
     assert lines[3] == "  and 7 more"
 
 
-def test_the_digits_of_a_run_that_gave_up_reach_no_further_than_it_did() -> None:
-    digits = {"solution_error_relative_max": error("1e-9")}
-    lines = said(row(metrics=digits, outcome="step_limit", time_reached="7.5", horizon="1000"))
-    assert lines[-1].endswith("9.0 to 7.5")
-
-
 def test_of_steps_that_were_not_measured_nothing_is_said() -> None:
     unmeasured = {"local_error_ulp_max": Metric("missing", None, "error")}
     lines = said(row(measure="local_error", outcome="step_too_small", samples=0, metrics=unmeasured))
@@ -174,11 +168,6 @@ def escaping(integrator: str, time: str, gamma: str, drift: str) -> Row:
 def test_an_escape_time_hides_no_error(time: str, gamma: str, drift: str, words: str) -> None:
     lines = said(escaping("heyoka", "33.6", "1e-12", "1e-14"), escaping("mine:rk4", time, gamma, drift))
     assert lines[3:] == [f"euler: {words}"] * bool(words)
-
-
-def test_a_row_of_many_integrators_is_whole() -> None:
-    lines = said(*(escaping(f"mine:{i}", "33.609", "1e-12", "1e-14") for i in range(20)))
-    assert "".join(lines).count("33.609") == 20
 
 
 @pytest.mark.parametrize(("end", "words"), [("5e-6", " At the end it is 5e-6, heyoka's 1e-12."), ("9e-11", "")])

@@ -15,14 +15,13 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.features.kinds import KINDS
-from heavytop.records import Metric, Report
+from heavytop.records import Report
 from heavytop.report.document.document import row_name
 from heavytop.report.render import FORMATS
-from heavytop.report.render.export import LOST, export, measures
+from heavytop.report.render.export import LOST, export
 from heavytop.version import version
 from support import in_process
 from support.reports import store
-from support.small_reports import row
 
 ROOT = Path(__file__).parents[2]
 
@@ -136,11 +135,3 @@ def test_the_command_writes_a_file_or_standard_output_and_refuses_another_format
         export(Report("heavytop-report/2", {}, {}, []), "", KINDS)
     assert json.loads(export(Report("heavytop-report/2", {}, {}, []), "bencher", KINDS))
     assert {"bencher", "github-action-benchmark", "asv", "junit", "csv"} <= FORMATS.keys()
-
-
-def test_a_loss_of_two_per_cent_is_in_the_number_of_an_error() -> None:
-    before, after = (
-        measures(row(metrics={"solution_error_relative_max": Metric(value, log10)}))
-        for value, log10 in (("1E-9", -9.0), ("1.02E-9", -8.9914))
-    )
-    assert [next(iter(numbers)).value for numbers in (before, after)] == [-9.0, -8.9914]

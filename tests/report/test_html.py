@@ -199,12 +199,6 @@ def test_what_is_not_drawn_is_said() -> None:
     assert f"{50 - MOST_PLOTS} more cases not drawn" in section[1].notes[0]
 
 
-def test_errors_smaller_than_any_float_have_their_place() -> None:
-    x, y = points(Series(["1", "10", "100"], ["1e-997", "nan", "1e-990"]), -1000.0)
-    assert x == [0, 2]
-    assert y == [3, 10]
-
-
 @pytest.mark.parametrize("exponent", [0.0, 0.5, 1.5])
 def test_a_law_lies_on_the_samples_that_follow_it(exponent: float) -> None:
     x, y = points(power(exponent, 1e-16))

@@ -144,13 +144,6 @@ def test_two_tops_of_one_name_in_two_plans_are_two(tmp_path: Path) -> None:
     assert judged(mine, ran("1/2", "4/5"))[0] == "incomparable"
 
 
-def test_numbers_of_any_length_are_written_and_read(tmp_path: Path) -> None:
-    case = CASES["euler"]
-    long = change(case, start=change(case.start, omega=(exact("1e-4900") + 1, exact("0"), exact("1/3"))))
-    made = row(data=data_of(long))
-    assert store.read(store.write(report(made), tmp_path)).rows[0].data == made.data
-
-
 @pytest.mark.slow
 def test_every_row_of_a_motion_has_its_data_those_of_ensembles_too(tmp_path: Path) -> None:
     run = {"precision": "double", "horizon": "1", "samples": 4, "decades": 1, "starts": 8}

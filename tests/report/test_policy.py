@@ -119,13 +119,6 @@ def test_a_rule_behind_one_that_matches_the_same_is_said(tmp_path: Path) -> None
     )
 
 
-def test_changed_flags_are_compared_only_where_the_policy_says_so(tmp_path: Path) -> None:
-    other = drift("1e-12", flags={"tolerance": "1e-9"})
-    assert verdicts(drift("1e-12"), other, Policy()) == {"": "incomparable"}
-    given = policy(tmp_path, "flags = 'ignore'")
-    assert verdicts(drift("1e-12"), other, given) == {"drift_energy_max": "same"}
-
-
 @pytest.mark.parametrize(
     ("when", "machine", "verdict"),
     [
@@ -150,10 +143,6 @@ def test_timings_compare_by_their_own_rule(tmp_path: Path, when: str, machine: s
     if verdict:
         back = {f.metric: f.verdict.value for f in compare(new, old, given).findings}
         assert back["seconds run"] == "better"
-
-
-def test_timings_are_off_by_default() -> None:
-    assert Policy().timings.compare == "never"
 
 
 def test_a_difference_within_both_bands_in_quadrature_is_noise() -> None:

@@ -14,7 +14,7 @@ import msgspec
 import pytest
 
 import heavytop as ht
-from heavytop.records import Against, Law, Metric, Quantity, Row, RowKey, Series, Subject, by_name, of_row
+from heavytop.records import Against, Law, Metric, Row, RowKey, Series, Subject, of_row
 from support.small_reports import row
 
 METRICS = [
@@ -118,13 +118,6 @@ def test_errors_smaller_than_any_float_have_an_order() -> None:
     assert min(METRICS[:4]) is METRICS[2]
     assert not METRICS[6] < 1
     assert not METRICS[6] > 1
-
-
-def test_metrics_under_their_names_are_others_than_those_given() -> None:
-    quantity, given = Quantity("drift", "energy", "max"), METRICS[0]
-    named = by_name({quantity: given})
-    assert named["drift_energy_max"].quantity == quantity
-    assert given.quantity is None
 
 
 def test_a_compressed_report_is_read_as_it_was_and_a_damaged_one_refused(tmp_path: Path) -> None:

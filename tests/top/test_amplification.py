@@ -15,7 +15,7 @@ from heavytop.cases import CASES
 from heavytop.integrate.multiword.motions import integrate_to_samples
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import exact, number, real
-from heavytop.top.amplification import FOLLOWED, _path, amplification, loss, rate
+from heavytop.top.amplification import FOLLOWED, amplification, loss, rate
 from heavytop.top.equations import HEAVY_TOP, Parameters
 from heavytop.top.heavy_top import HeavyTop, State
 from support.helpers import in_units
@@ -221,17 +221,3 @@ def test_the_rate_is_a_power_of_two_above_every_part(omega: str) -> None:
     assert exact(omega) < found <= 4 * exact(omega)
     pull = rate(HEAVY_TOP, Parameters((4, "1/4", 2), (0, exact(omega), 0), 0), STILL.flat)
     assert exact(omega) * 4 < pull**2 <= 64 * exact(omega)
-
-
-def test_a_path_that_is_shared_gives_what_a_fresh_one_does() -> None:
-    given = HEAVY_TOP, HEAVY_TOP.parameters(GENERIC.top, GENERIC.start), tuple(GENERIC.start.flat)
-    horizons = [Fraction(1, 3), Fraction(7), Fraction(-7), Fraction(40), Fraction(10**5)]
-    fresh = []
-    for horizon in horizons:
-        _path.cache_clear()
-        amplification.cache_clear()
-        fresh.append(amplification(*given, horizon, 60))
-    amplification.cache_clear()
-    shared = [amplification(*given, horizon, 60) for horizon in reversed(horizons)]
-    assert shared[::-1] == fresh
-    assert fresh[0] < fresh[1] < fresh[3] < fresh[4]

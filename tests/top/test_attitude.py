@@ -14,9 +14,7 @@ from heavytop.exact.flint.balls import FUNCTIONS, ball, working_precision
 from heavytop.precision import cross
 from heavytop.top.attitude import (
     SEQUENCES,
-    attitude_from_angles,
     euler_of_rows,
-    gamma_from_angles,
     matrix_of_quaternion,
     multiplied,
     quaternion_of_rows,
@@ -92,13 +90,6 @@ def test_euler_angles_are_a_product_of_elementary_rotations_and_come_back(sequen
         assert flat(rows) == pytest.approx(flat(multiplied(first, multiplied(second, third))), abs=1e-15)
         assert euler_of_rows(rows, sequence, math) == pytest.approx((a, b, c), abs=1e-13)
         assert flat(Attitude.euler(sequence.lower(), a, b, c).rows(math)) == pytest.approx(flat(rows), abs=1e-15)
-
-
-def test_zxz_is_the_papers_3_2_with_its_angles_in_the_order_psi_theta_phi() -> None:
-    phi, theta, psi = 0.7, 1.9, -2.2
-    rows = rows_of_euler("ZXZ", (psi, theta, phi), math)
-    assert rows[2] == pytest.approx(gamma_from_angles(phi, theta, math))
-    assert rows[0] == pytest.approx(attitude_from_angles(phi, theta, psi, math))
 
 
 def test_axis_and_angle_is_rodrigues_formula() -> None:

@@ -14,9 +14,7 @@ from heavytop.top.amplification import rate
 from heavytop.top.equations import (
     Parameters,
     area,
-    gyrostat,
     heavy_gyrostat,
-    heavy_top,
     kovalevskaya_yehia,
     largest,
     square_of_rate,
@@ -128,30 +126,6 @@ def test_an_integral_is_not_offered_where_its_derivative_is_not_zero(name, inert
     assert name not in {each.name for each in holding(top, start, HEAVY_GYROSTAT)}
 
 
-def test_without_a_rotor_it_is_the_heavy_top() -> None:
-    random = Random(1)
-    top, start = HeavyTop(("3", "5/2", "1"), 2, vector(random)), State(vector(random), unit_vector(random))
-    p, own = HEAVY_TOP.parameters(top, start), HEAVY_GYROSTAT.parameters(top, start)
-    assert own.rotor == (0, 0, 0)
-    assert heavy_gyrostat(own, start.flat) == heavy_top(p, start.flat)
-    names = [each.name for each in holding(top, start, HEAVY_GYROSTAT)]
-    assert names == ["gamma_squared", "area", "energy"]
-
-
-def test_the_gyrostat_is_its_case_with_a_rotor_along_axis_2_and_no_weight() -> None:
-    """Ω here is Ω + λ e2 there, k = (0, −I2 λ, 0), n = 0; M, γ and every integral are the same."""
-    random = Random(2)
-    for _ in range(5):
-        inertia, turning = moments(random), fraction(random)
-        there = Parameters(inertia, (1, 2, 3), turning)
-        here = Parameters(inertia, (0, 0, 0), (0, -inertia[1] * turning, 0))
-        y = (*vector(random), *unit_vector(random))
-        moved = (y[0], y[1] + turning, *y[2:])
-        assert gyrostat(there, y) == heavy_gyrostat(here, moved)
-        assert GYROSTAT.angular_velocity(there, y) == HEAVY_GYROSTAT.angular_velocity(here, moved)
-        assert dot([i * w for i, w in zip(inertia, y, strict=False)], y[3:]) == area(here, moved)
-
-
 def test_a_top_says_its_rotor_and_differs_by_it() -> None:
     plain = HeavyTop((3, 2, 1), 1, (0, 0, 1))
     top = HeavyTop((3, 2, 1), 1, (0, 0, 1), rotor=(0, "1/3", -2))
@@ -210,10 +184,3 @@ def test_the_bound_of_an_integral_bounds_it() -> None:
     p, speed = HEAVY_GYROSTAT.parameters(top, start), max(map(abs, start.omega))
     for integral in holding(top, start, HEAVY_GYROSTAT):
         assert abs(integral.value(p, start.flat)) <= largest(integral, p, speed)
-
-
-def test_numbers_go_to_compiled_code_and_back() -> None:
-    for which, rotor in ((HEAVY_TOP, 0), (GYROSTAT, 7), (HEAVY_GYROSTAT, (7, 8, 9))):
-        p = Parameters((1, 2, 3), (4, 5, 6), rotor)
-        back = which.taken_in(which.entering(p))
-        assert all(getattr(back, name) == getattr(p, name) for name in which.enters)

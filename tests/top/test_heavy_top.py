@@ -11,12 +11,6 @@ from heavytop.top.heavy_top import require_physical
 from support.helpers import unit_vector, vector
 
 
-@pytest.mark.parametrize("inertia", [(1, 0, 2), (1, 2, -3), ("1", "2", "-1/9")])
-def test_moments_that_are_not_positive_are_refused(inertia) -> None:
-    with pytest.raises(InputError, match=r"I\d must be positive; got"):
-        HeavyTop(inertia, 1, (0, 0, 1))
-
-
 def test_moments_that_no_body_has_are_a_warning_only() -> None:
     assert HeavyTop((1, 1, 3), 1, (0, 0, 1)).warnings() == [
         "I3 = 3 exceeds the sum 2 of the other two: no rigid body has such moments."

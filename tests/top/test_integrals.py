@@ -101,11 +101,3 @@ def test_a_flipped_sign_in_the_field_is_caught_by_an_integral(wrong) -> None:
         p = HEAVY_TOP.parameters(top, start)
         rates = [derivative(i, p, start.flat, wrong) for i in holding(top, start)]
         assert any(rate != 0 for rate in rates), name
-
-
-def test_integrals_that_do_not_hold_are_not_offered() -> None:
-    random = Random(4)
-    for _ in range(20):
-        top = HeavyTop((3, 2, 1), positive(random), vector(random))
-        names = {integral.name for integral in holding(top, State(vector(random), unit_vector(random)))}
-        assert names == {"gamma_squared", "area", "energy"}

@@ -148,9 +148,3 @@ def test_sentence_attribute_and_key_say_the_same() -> None:
     assert run.stability == known.stability
     assert known.document()["stability"]["verdict"] == "unstable"
     assert ht.propagate(CASES["generic"].top, CASES["generic"].start, [1]).stability is None
-
-
-@pytest.mark.parametrize("unit", [Fraction(1, 10**60), Fraction(10**60)])
-def test_a_unit_of_time_scales_the_rate(unit: Fraction) -> None:
-    found = of(ht.HeavyTop((3, 2, 1), 0, (0, 0, 0)), ht.State((0, unit, 0), (0, 0, 1)))
-    assert found.rate / float(unit) == pytest.approx(3**-0.5)

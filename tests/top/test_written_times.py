@@ -83,13 +83,6 @@ def test_times_are_exact_and_checked_once() -> None:
     assert close.doubles == []
 
 
-def test_doubles_are_a_copy_and_backwards_they_go_as_well() -> None:
-    given = np.array([-0.5, -1.0])
-    found = check_times(given)
-    given[0] = 7
-    assert list(found) == [Fraction(-1, 2), -1]
-
-
 @pytest.mark.parametrize(
     ("times", "message"),
     [
