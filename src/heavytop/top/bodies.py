@@ -84,20 +84,18 @@ def principal_axes(tensor: Rows[Fraction], bits: int) -> PrincipalAxes:
         return _with_remainder(tensor, IDENTITY)
     bits += _spread(tensor)
     near = _near(tensor, bits)
-    axes = _rational(tensor, near)
-    if axes is not None:
-        return axes
     turned = multiplied(transposed(near), multiplied(tensor, near))
-    first, second, third = (round_to(turned[i][i], bits + _GUARD_BITS) for i in range(3))
-    return _with_remainder(tensor, near, _exact_moments(tensor, (first, second, third)))
+    moments = [_exact_moment(tensor, round_to(turned[i][i], bits + _GUARD_BITS)) for i in range(3)]
+    is_exact = not any(determinant(_less(tensor, [moment] * 3)) for moment in moments)
+    vectors = _unit_vectors(tensor, moments) if is_exact else None
+    return _with_remainder(tensor, near, moments) if vectors is None else _with_remainder(tensor, _along(vectors, near))
 
 
-def _with_remainder(tensor: Rows[Fraction], axes: Tensor, moments: Vector | None = None) -> PrincipalAxes:
+def _with_remainder(tensor: Rows[Fraction], axes: Tensor, moments: Sequence[Fraction] | None = None) -> PrincipalAxes:
     """The principal axes with their remainder; moments: None for the diagonal in these axes."""
     rotated_tensor = multiplied(transposed(axes), multiplied(tensor, axes))
-    (first, _, _), (_, second, _), (_, _, third) = rotated_tensor
-    moments = moments or (first, second, third)
-    return PrincipalAxes(axes, moments, _less(rotated_tensor, moments))
+    first, second, third = moments or (rotated_tensor[i][i] for i in range(3))
+    return PrincipalAxes(axes, (first, second, third), _less(rotated_tensor, (first, second, third)))
 
 
 def _spread(tensor: Rows[Fraction]) -> int:
@@ -124,26 +122,15 @@ def _less(tensor: Rows[Fraction], moments: Sequence[Fraction]) -> Three[Vector]:
     return (a - moments[0], b, c), (d, e - moments[1], f), (g, h, i - moments[2])
 
 
-def _exact_moments(tensor: Rows[Fraction], near: Vector) -> Vector:
-    """Each rational moment in place of the number near it: over the common denominator it is an integer."""
+def _exact_moment(tensor: Rows[Fraction], near: Fraction) -> Fraction:
+    """The rational moment in place of the number near it: over the common denominator it is an integer."""
     common = lcm(*(value.denominator for row in tensor for value in row))
-    moments = []
-    for value in near:
-        candidate = Fraction(round(value * common), common)
-        moments.append(candidate if determinant(_less(tensor, [candidate] * 3)) == 0 else value)
-    return moments[0], moments[1], moments[2]
+    candidate = Fraction(round(near * common), common)
+    return near if determinant(_less(tensor, [candidate] * 3)) else candidate
 
 
-def _rational(tensor: Rows[Fraction], near: Rows[Fraction]) -> PrincipalAxes | None:
-    """The principal axes where all moments and unit vectors are rational, ordered as the axes near them; else None."""
-    turned = multiplied(transposed(near), multiplied(tensor, near))
-    guess = (turned[0][0], turned[1][1], turned[2][2])
-    moments = _exact_moments(tensor, guess)
-    if any(determinant(_less(tensor, [moment] * 3)) for moment in moments):
-        return None
-    vectors = _unit_vectors(tensor, moments)
-    if vectors is None:
-        return None
+def _along(vectors: Sequence[Vector], near: Rows[Fraction]) -> Three[Vector]:
+    """The rotation whose columns are principal unit vectors, in the order and directions of the axes near them."""
     order = max(
         permutations(range(3)),
         key=lambda chosen: sum(abs(dot(vectors[chosen[i]], transposed(near)[i])) for i in range(3)),
@@ -152,10 +139,10 @@ def _rational(tensor: Rows[Fraction], near: Rows[Fraction]) -> PrincipalAxes | N
     columns = [v if dot(v, u) >= 0 else (-v[0], -v[1], -v[2]) for v, u in zip(columns, transposed(near), strict=True)]
     if determinant(columns) < 0:
         columns[2] = (-columns[2][0], -columns[2][1], -columns[2][2])
-    return _with_remainder(tensor, transposed(columns))
+    return transposed(columns)
 
 
-def _unit_vectors(tensor: Rows[Fraction], moments: Vector) -> list[Vector] | None:
+def _unit_vectors(tensor: Rows[Fraction], moments: Sequence[Fraction]) -> list[Vector] | None:
     """Three rational unit vectors along principal axes; None where there are none."""
     single = [moment for moment in moments if moments.count(moment) == 1]
     vectors = []

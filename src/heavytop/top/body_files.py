@@ -292,16 +292,11 @@ class _Numbers:
         return (a, b, c, d, e, f), min(2 * min(self.units, default=Fraction(0)), _MOST_SLACK * max(map(abs, (a, b, c))))
 
 
-def _rotation(attitude: Attitude) -> Tensor:
-    first, second, third = attitude.exact_rows() or attitude.rational_rows(2 * _BITS)
-    return first, second, third
-
-
 def _rpy(numbers: _Numbers, text: str | None, degrees: bool = False) -> Tensor:
     """Roll, pitch and yaw about fixed axes: R = R_z(yaw) R_y(pitch) R_x(roll)."""
     unit = "deg" if degrees else ""
     roll, pitch, yaw = (f"{angle}{unit}" for angle in numbers.three(text, "rpy", "0 0 0"))
-    return _rotation(Attitude.euler("ZYX", yaw, pitch, roll))
+    return Attitude.euler("ZYX", yaw, pitch, roll).rational_rows(2 * _BITS)
 
 
 def _in_axes(axes: Tensor, six: Six) -> Six:
@@ -309,8 +304,7 @@ def _in_axes(axes: Tensor, six: Six) -> Six:
     turned = six_of(multiplied(axes, multiplied(rows(six), transposed(axes))))
     if all(value.denominator < 1 << _BITS for row in axes for value in row):
         return turned
-    a, b, c, d, e, f = (round_to(value, _BITS) for value in turned)
-    return a, b, c, d, e, f
+    return six_of(rows([round_to(value, _BITS) for value in turned]))
 
 
 Pose = tuple[Tensor, Vector]
@@ -379,26 +373,20 @@ def _uniform(kind: str, sizes: Sequence[Fraction]) -> Vector:
     return (3 * first + others[0]) / 12, (3 * first + others[0]) / 12, first / 2
 
 
-def _primitive(numbers: _Numbers, geometry: Element) -> Vector | None:
-    """Moments of a box, cylinder or sphere of unit mass, with its dimensions as attributes or elements."""
-    for kind, count in _SIZES.items():
-        if (shape := geometry.find(kind)) is not None:
-            size, *lengths = ((shape.get(key, shape.findtext(key)), key) for key in ("size", "radius", "length"))
-            return _uniform(
-                kind, numbers.three(*size) if kind == "box" else [numbers.number(*length) for length in lengths[:count]]
-            )
-    return None
-
-
 def _shapes(numbers: _Numbers, link: Element, pose: Callable[[Element], Pose]) -> list[Shape]:
-    """Its collision shapes, or where there are none its visual ones; [] where a mesh is among them."""
+    """Its collision shapes, or where there are none its visual ones; [] where a mesh is among them.
+
+    Dimensions are attributes or elements.
+    """
     shapes: list[Shape] = []
     for shape in link.findall("collision") or link.findall("visual"):
-        geometry = shape.find("geometry")
-        moments = None if geometry is None else _primitive(numbers, geometry)
-        if moments is None:
+        solid = next((part for part in shape.iterfind("geometry/*") if part.tag in _SIZES), None)
+        if solid is None:
             return []
-        shapes.append((*pose(shape), moments))
+        size, *lengths = ((solid.get(key, solid.findtext(key)), key) for key in ("size", "radius", "length"))
+        lengths = lengths[: _SIZES[solid.tag]]
+        sizes = numbers.three(*size) if solid.tag == "box" else [numbers.number(*length) for length in lengths]
+        shapes.append((*pose(shape), _uniform(solid.tag, sizes)))
     return shapes
 
 
@@ -731,7 +719,7 @@ class _MjcfFrames:
         if key == "quat":
             return _turn(*values)
         if key == "axisangle":
-            return _rotation(Attitude.axis_angle(values[:3], f"{values[3]}{unit}"))
+            return Attitude.axis_angle(values[:3], f"{values[3]}{unit}").rational_rows(2 * _BITS)
         if key == "xyaxes":
             return _of_axes(values[:3], values[3:])
         if key == "zaxis":  # the least rotation of e_z to it
@@ -740,7 +728,7 @@ class _MjcfFrames:
         turns = _IDENTITY
         for letter, angle in zip(self.settings.get("eulerseq", "xyz"), values, strict=True):
             around = [int(letter.lower() == name) for name in "xyz"]
-            turn = _rotation(Attitude.axis_angle(around, f"{angle}{unit}"))
+            turn = Attitude.axis_angle(around, f"{angle}{unit}").rational_rows(2 * _BITS)
             turns = multiplied(turns, turn) if letter.islower() else multiplied(turn, turns)
         return turns
 
@@ -761,7 +749,7 @@ class _MjcfFrames:
 
 
 def _turn(*quaternion: Any) -> Tensor:
-    return _rotation(Attitude.quaternion(*quaternion, normalize=True))
+    return Attitude.quaternion(*quaternion, normalize=True).rational_rows(2 * _BITS)
 
 
 def _unit(values: Sequence[Fraction]) -> Vector:
@@ -779,7 +767,7 @@ def _of_axes(x: Sequence[Fraction], y: Sequence[Fraction]) -> Tensor:
     first = _unit(x)
     third = _unit(cross(first, vector(y, "xyaxes")))
     columns = (first, cross(third, first), third)
-    return _rotation(Attitude.matrix(transposed(columns), normalize=True))
+    return Attitude.matrix(transposed(columns), normalize=True).rational_rows(2 * _BITS)
 
 
 _PHYSICS = ("mass", "centerOfMass", "diagonalInertia", "principalAxes", "gravityMagnitude", "gravityDirection")

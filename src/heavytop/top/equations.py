@@ -172,9 +172,8 @@ class System:
         parameters: dict[str, Any] = dict.fromkeys(Parameters._fields)
         remaining = list(numbers)
         for name in self.enters:
-            size = 1 if name == "rotor" and self is GYROSTAT else 3
-            part, remaining = tuple(remaining[:size]), remaining[size:]
-            parameters[name] = part if size == 3 else part[0]
+            part, remaining = (remaining, []) if name == "rotor" else (remaining[:3], remaining[3:])
+            parameters[name] = tuple(part) if len(part) > 1 else part[0]
         return Parameters(**parameters)
 
     def rates(self, p: Parameters, y: Sequence[Scalar]) -> tuple[Scalar, ...]:

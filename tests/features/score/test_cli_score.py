@@ -17,7 +17,7 @@ from heavytop.cases import CASES
 from heavytop.cli import app
 from heavytop.errors import InputError
 from heavytop.features.kinds import KINDS
-from heavytop.features.score.measurement import Assessment, assess
+from heavytop.features.score.measurement import Assessment, assess, direction
 from heavytop.features.score.text import digits_over_time, guessed, requirement, score_report, score_text
 from heavytop.features.score.trajectories.files import read as read_file
 from heavytop.features.score.trajectories.observed import GivenTrajectory, of_arrays
@@ -98,7 +98,7 @@ def test_there_is_no_sentence_about_heyoka_where_it_did_not_run(name: str, monke
 
 @pytest.mark.slow
 def test_without_a_reference_and_without_a_sample_no_digits_are_said(unknown: Assessment) -> None:
-    assert (unknown.digits_right, digits_kept(unknown.row), unknown.peer, unknown.direction) == (None,) * 4
+    assert (unknown.digits_right, digits_kept(unknown.row), unknown.peer, direction(unknown.row)) == (None,) * 4
     assert "no reference" in unknown.row.against
     assert "drift_energy_max" in unknown.row.metrics
     assert printed(unknown)[0].startswith("The number of digits right is unknown")

@@ -563,12 +563,3 @@ def _listed(
         return [time, "rises" if events.directions[index] > 0 else "falls", *state]
 
     return TitledTable(title, ("t", "sign", *NAMES), Lazy(len(events), line), notes)
-
-
-def arrays(times: Sequence[Any], states: Sequence[Any], directions: Sequence[int]) -> tuple[Array, Array, Array]:
-    """Times (n,), states (n, 6) and directions (n,) as arrays, also where there are none."""
-    return (
-        numpy.array(times) if len(times) else numpy.empty(0),
-        numpy.array(states) if len(states) else numpy.empty((0, 6)),
-        numpy.array(directions, dtype=numpy.int64),
-    )

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
 
+import numpy
 from flint import fmpq, fmpq_poly
 
 from heavytop.errors import InputError, quoted
@@ -23,7 +24,6 @@ from heavytop.features.events.functions import (
     EventFunction,
     Events,
     Wanted,
-    arrays,
     composed,
     in_body_axes,
     terms_of,
@@ -101,7 +101,9 @@ def locate(run: Dense, integrator: str, wanted: Wanted, axes: Axes | None = None
         function.name,
         wanted.direction,
         POLYNOMIAL if function.rational else SAMPLED,
-        *arrays(times, states, directions),
+        numpy.array(times),
+        numpy.array(states) if states else numpy.empty((0, 6)),
+        numpy.array(directions, dtype=numpy.int64),
         run.until,
         outcome or run.outcome,
         run.reached,
@@ -213,8 +215,6 @@ class _Sampler:
 
     def value(self, piece: Piece, s: fmpq) -> Any:
         """The function at s; raises InputError where it raises, or gives no finite number."""
-        import numpy
-
         state = native_state(_given(piece.state(s), self.axes), self.precision)
         if state is None:
             raise InputError("The state is too large for its format.", "Choose other units, or a wider format.")

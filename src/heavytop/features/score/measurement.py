@@ -223,11 +223,6 @@ class Assessment:
         """Decimal digits of the format."""
         return digits_of(self.row.bits)
 
-    @property
-    def direction(self) -> str | None:
-        """Where most of the error lies."""
-        return direction(self.row)
-
 
 def direction(row: Row) -> str | None:
     """Where most of the error lies: "along" the flow, "across" it, "both"; None where neither is a number."""

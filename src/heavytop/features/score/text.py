@@ -410,7 +410,7 @@ def to_json(assessment: Assessment) -> dict[str, Any]:
     further: dict[str, Any] = {"scored": assessment.used} if assessment.used else {}
     further |= {
         "peer": peer,
-        "mostly": assessment.direction,
+        "mostly": direction(assessment.row),
         "format_guessed": assessment.format_guessed,
         "diagnosis": diagnoses,
     }

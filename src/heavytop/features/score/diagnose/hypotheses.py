@@ -31,7 +31,7 @@ from heavytop.features.score.diagnose.samples import (
 from heavytop.features.score.diagnose.search import ALIKE, FITTED_DROP, FLOOR, Array, Hypothesis
 from heavytop.precision import cross, decimal_text
 from heavytop.top.attitude import rotated, transposed
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, NAMES, Parameters, System
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, NAMES, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 # Other readings of the columns: axes renamed or reversed, γ down, M in place of Ω.
@@ -435,10 +435,6 @@ class _Weighted(System):
         """Moments, n and the numbers; those of the plain equations where the parameters have none."""
         return (*p.inertia, *p.moment, *_numbers_of(p))
 
-    def taken_in(self, numbers: Sequence[Any]) -> Parameters:
-        """The parameters of these :meth:`entering` numbers."""
-        return Parameters(tuple(numbers[:3]), tuple(numbers[3:6]), tuple(numbers[6:]))
-
 
 def _numbers_of(p: Parameters) -> Sequence[Any]:
     return p.rotor if isinstance(p.rotor, tuple) else [Fraction(number) for number in _PLAIN.tolist()]
@@ -508,7 +504,9 @@ def _of_field(
     weights[numpy.ix_(rows, components)] = weight
     rotor = floats(run.top.rotor or (Fraction(0),) * 3)
     values = numpy.concatenate([rotor, run.frame.axes.reshape(-1), weights.reshape(-1)]).tolist()
-    system = _Weighted("weighted_heavy_gyrostat", _weighted, HEAVY_TOP.angular_velocity, numbers=tuple(values))
+    system = _Weighted(
+        "weighted_heavy_gyrostat", _weighted, HEAVY_TOP.angular_velocity, HEAVY_GYROSTAT.enters, tuple(values)
+    )
     return Hypothesis(kind, numbers, replace(run, system=system).motion_errors(), FITTED_DROP)
 
 

@@ -385,7 +385,7 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
     with readable(f"The trajectory {shown_path}", REMEDY):
         content = sys.stdin.buffer.read() if piped else read_whole(path)
         text = _text_of(path, content)
-    text = logs.of_ephemeris(text) if logs.is_ephemeris(text) else logs.without_preamble(text)
+    text = logs.as_table(text)
     if re.match(r'\s*\{\s*"schema"\s*:\s*"heavytop-report', text):
         raise InputError(f"{shown_path} is a report, not a trajectory.", f"`heavytop show {shown_path}` shows it.")
     is_json = text.lstrip().startswith("{") if piped else path.suffix.lower() == ".json"

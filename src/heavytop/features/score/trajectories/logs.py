@@ -327,8 +327,13 @@ def of_rotation_vector(v: Sequence[Fraction]) -> tuple[Fraction, ...]:
         return midpoint(half.cos()), *(sine * x for x in v)
 
 
-def without_preamble(text: str) -> str:
-    """A table of OpenSim, or of a rigid body by OptiTrack's Motive, with the lines above it as comments."""
+def as_table(text: str) -> str:
+    """An attitude ephemeris message as a table.
+
+    A table of OpenSim, or of a rigid body by OptiTrack's Motive, with the lines above it as comments.
+    """
+    if re.match(r"(\s|#.*\n)*CCSDS_AEM_VERS", text):
+        return of_ephemeris(text)
     lines = text.splitlines()
     begin = next((n for n, line in enumerate(lines) if line.startswith("Format Version,")), len(lines))
     end = next((n for n in range(begin, len(lines)) if lines[n].startswith("Frame,")), 0)
@@ -357,11 +362,6 @@ _LIKE = 0.8
 """Similarity from which a key is a misspelling of one that is used."""
 _SPACECRAFT = re.compile(r"SC_|SPACECRAFT|.*BODY|ACTUATOR|INSTRUMENT|CSS|DSS|GYRO|IMU|STARTRACKER", re.IGNORECASE)
 """Frames of a message that turn with the spacecraft."""
-
-
-def is_ephemeris(text: str) -> bool:
-    """Whether a text is an attitude ephemeris message."""
-    return re.match(r"(\s|#.*\n)*CCSDS_AEM_VERS", text) is not None
 
 
 def of_ephemeris(text: str) -> str:

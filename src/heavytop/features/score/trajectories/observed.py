@@ -33,6 +33,7 @@ from heavytop.top.attitude import Angle, Attitude, multiple_of_quaternion, perpe
 from heavytop.top.bodies import CENTRE, IDENTITY, Body
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, VARIABLES, System, system_of
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
+from heavytop.top.inertia_slips import determinant
 
 # Bodies of trajectory files: rounded to a format, in principal axes, and in double.
 #
@@ -199,24 +200,20 @@ def require_rotation(form: str, values: Sequence[Fraction], slack: Fraction, wha
                 "Divide it by its length, or use --normalize (normalize=True in Python).",
             )
     if form == "matrix":
-        require_matrix([values[0:3], values[3:6], values[6:9]], slack, what)
-
-
-def require_matrix(rows: Sequence[Sequence[Fraction]], slack: Fraction, what: str) -> None:
-    """Raises InputError for a reflection, and for rows that are not orthogonal and of length 1 within ``slack``."""
-    determinant = dot(rows[0], cross(rows[1], rows[2]))
-    products = [dot(rows[i], rows[j]) - (i == j) for i in range(3) for j in range(i + 1)]
-    off = max(products, key=abs)
-    if determinant < 0 and abs(off) <= _FAR:
-        raise InputError(
-            f"{what} is a reflection, not a rotation: its determinant is {six_digits(determinant)}.",
-            "These are left-handed axes: reverse one axis of space or of the body.",
-        )
-    if abs(off) > 2 * slack:
-        raise InputError(
-            f"{what} is not orthogonal: R R^T differs from the identity by {six_digits(off)}.",
-            "Write all its digits, or use --normalize (normalize=True in Python), which takes the nearest rotation.",
-        )
+        rows = [values[0:3], values[3:6], values[6:9]]
+        volume = determinant(rows)
+        off = max((dot(rows[i], rows[j]) - (i == j) for i in range(3) for j in range(i + 1)), key=abs)
+        if volume < 0 and abs(off) <= _FAR:
+            raise InputError(
+                f"{what} is a reflection, not a rotation: its determinant is {six_digits(volume)}.",
+                "These are left-handed axes: reverse one axis of space or of the body.",
+            )
+        if abs(off) > 2 * slack:
+            remedy = "Write all its digits, or use --normalize (normalize=True in Python)"
+            raise InputError(
+                f"{what} is not orthogonal: R R^T differs from the identity by {six_digits(off)}.",
+                f"{remedy}, which takes the nearest rotation.",
+            )
 
 
 def raw_start(start: State) -> RawStart:
@@ -306,7 +303,14 @@ def of_arrays(
     require_states(times, rows)
     form = precision or written_numbers.of_bits(max(bits_of(value) for row in rows for value in row))
     states = [rounded_state([component(value) for value in row], form) for row in rows]
-    return GivenTrajectory(*_names(name, integrator), top, start, which, form, times, states, _outcome(states), 0, {})
+    return _from_memory((name, integrator), top, start, which, form, times, states)
+
+
+def _from_memory(names: tuple[str, str], *data: Any, observed: Observed | None = None) -> GivenTrajectory:
+    """The trajectory of this name and integrator; data: top, start, system, format, times and states."""
+    name, integrator = named(names[0], "name"), named(names[1], "integrator")
+    fields: Any = (*data, Outcome.NON_FINITE if None in data[-1] else Outcome.SUCCESS, 0, {})
+    return replace(GivenTrajectory(name, integrator, *fields), observed=observed)
 
 
 def require_states(times: list[Fraction], rows: list[Any]) -> None:
@@ -487,17 +491,8 @@ def of_observed_arrays(
     places = [f"row {i}" for i in range(len(times))]
     quantities, states = observed(body, raw, convention, values, places, form, normalize)
     require_physical(quantities.posed.top, quantities.posed.start)
-    top, start, which = quantities.posed.top, quantities.posed.start, system_of(None, body)
-    own = GivenTrajectory(*_names(*names), top, start, which, form, times, states, _outcome(states), 0, {})
-    return replace(own, observed=quantities)
-
-
-def _names(name: str, integrator: str) -> tuple[str, str]:
-    return named(name, "name"), named(integrator, "integrator")
-
-
-def _outcome(states: Sequence[object]) -> Outcome:
-    return Outcome.NON_FINITE if None in states else Outcome.SUCCESS
+    top, start = quantities.posed.top, quantities.posed.start
+    return _from_memory(names, top, start, system_of(None, body), form, times, states, observed=quantities)
 
 
 def _row(row: Sequence[Any], where: str) -> tuple[Fraction, ...] | None:
