@@ -320,17 +320,15 @@ class Attitude:
 
     def rational_rows(self, bits: int) -> Three[Vector]:
         """R where it is rational; else a rational rotation, exactly orthogonal, within 2^-bits of it."""
-        known = self.exact_rows()
-        return known if known is not None else rotation_of(self._near_quaternion(bits + _GUARD_BITS))
-
-    def _near_quaternion(self, bits: int) -> tuple[Fraction, ...]:
+        if (known := self.exact_rows()) is not None:
+            return known
         import mpmath
 
         # mpmath.mp is shared by all threads
         lib = mpmath.MPContext()
-        lib.prec = bits
+        lib.prec = bits + _GUARD_BITS
         rows = self.rows(lib, lambda value: lib.mpf(value.numerator) / value.denominator)
-        return tuple(exact(value) for value in multiple_of_quaternion(rows))
+        return rotation_of([exact(value) for value in multiple_of_quaternion(rows)])
 
     def exact_rows(self) -> Three[Vector] | None:
         """R in exact rationals; None where some entry may be irrational."""

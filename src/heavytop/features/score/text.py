@@ -261,6 +261,7 @@ def _other_mistake(fit: Diagnosis, system: str) -> str:
     kind = "column_negated" if (fit.kind, numbers.get("factor")) == ("column_scaled", "-1") else fit.kind
     if (text := _SENTENCES.get(numbers.get("to", kind))) is None:
         return _integrals_off(numbers)
+    shift = numbers.get("shift", "")
     derived = {
         "columns_said": _columns(numbers),
         "order": f"axes {', '.join(numbers.get('axes', ''))} as 1, 2, 3",
@@ -268,15 +269,11 @@ def _other_mistake(fit: Diagnosis, system: str) -> str:
         "about": ", moments about the fixed point" if {"I11", "I22", "I33"} & numbers.keys() else "",
         "system": system,
         "other_system": _SYSTEM.get(system, ""),
-        "signed": _signed(numbers.get("shift", "")),
+        "signed": f"− {shift[1:]}" if shift.startswith("-") else f"+ {shift}",
         "whose": _WHOSE.get(numbers.get("of", ""), ""),
-        "still": _still(**numbers) if fit.kind == "frozen" else "",
+        "still": f"{numbers.get('vector', 'the state')} is constant, in {numbers.get('states')} states",
     }
     return text.format(**numbers | derived)
-
-
-def _still(states: str, vector: str = "", **_: str) -> str:
-    return f"{vector or 'the state'} is constant, in {states} states"
 
 
 def _time_unit(factor: str, steps: str = "") -> str:
@@ -288,10 +285,6 @@ def _time_unit(factor: str, steps: str = "") -> str:
     return (
         f"Each interval is one step too {off} ({taken} steps of 1/{n} of it), or the times are in another unit: {where}"
     )
-
-
-def _signed(shift: str) -> str:
-    return f"− {shift[1:]}" if shift.startswith("-") else f"+ {shift}"
 
 
 def _columns(numbers: dict[str, str]) -> str:

@@ -60,12 +60,14 @@ _MEANINGS: dict[str, tuple[float, float, bool]] = {
 """Factor of Ω, factor of γ, and whether M stands in place of Ω."""
 
 
-def _readings() -> Iterator[tuple[int, str, dict[str, str], list[int], list[float]]]:
-    """Every reading of the columns but the plain one: the number of its changes, kind and numbers.
+@cache
+def _every_reading() -> tuple[tuple[Any, ...], ...]:
+    """Every reading of the columns but the plain one, the simplest first: numbers of changes, kinds, numbers.
 
-    Then for each column its index among Ω, γ and M of a motion, and its factor.  Of renamed axes
+    Then for each column its indices among Ω, γ and M of a motion, and its factors.  Of renamed axes
     column i of a vector holds ±(axis |axes[i]|), counted from 1, ``of`` both vectors or of one.
     """
+    every: list[tuple[Any, ...]] = []
     plain, renamed = (1, 2, 3), list(permutations((1, 2, 3)))
     signs = [sign for sign in product((1, -1), repeat=3) if sign != (-1, -1, -1)]
     kinds: list[tuple[str, tuple[int, ...]]] = [
@@ -88,16 +90,11 @@ def _readings() -> Iterator[tuple[int, str, dict[str, str], list[int], list[floa
         ]
         columns = columns[3:] + columns[:3] if swapped else columns
         if changes:
-            yield changes, kind, numbers, [place for place, _ in columns], [factor for _, factor in columns]
+            every.append((changes, kind, numbers, [place for place, _ in columns], [factor for _, factor in columns]))
+    return tuple(zip(*sorted(every, key=lambda reading: reading[0]), strict=True))
 
 
 _LARGEST_UNIT = Fraction(10) ** 300
-
-
-@cache
-def _every_reading() -> tuple[tuple[Any, ...], ...]:
-    """Changes, kinds, numbers, indices and factors of every reading, the simplest first."""
-    return tuple(zip(*sorted(_readings(), key=lambda reading: reading[0]), strict=True))
 
 
 def readings(run: Examined, truth: Array) -> tuple[list[Hypothesis], list[Hypothesis]]:
@@ -425,6 +422,7 @@ class _Weighted(System):
     code, which is one for all of them, as a rotor does: systems that differ in them alone are equal.
     """
 
+    enters: tuple[str, ...] = HEAVY_GYROSTAT.enters
     numbers: tuple[float, ...] = field(default=(), compare=False)
 
     def parameters(self, top: HeavyTop, start: State) -> Parameters:
@@ -504,9 +502,7 @@ def _of_field(
     weights[numpy.ix_(rows, components)] = weight
     rotor = floats(run.top.rotor or (Fraction(0),) * 3)
     values = numpy.concatenate([rotor, run.frame.axes.reshape(-1), weights.reshape(-1)]).tolist()
-    system = _Weighted(
-        "weighted_heavy_gyrostat", _weighted, HEAVY_TOP.angular_velocity, HEAVY_GYROSTAT.enters, tuple(values)
-    )
+    system = _Weighted("weighted_heavy_gyrostat", _weighted, HEAVY_TOP.angular_velocity, numbers=tuple(values))
     return Hypothesis(kind, numbers, replace(run, system=system).motion_errors(), FITTED_DROP)
 
 

@@ -13,6 +13,7 @@ import numpy
 from heavytop import written_numbers
 from heavytop.arguments import MOST_STATES, SLACK_BITS, bits_of, component
 from heavytop.errors import InputError, prefixed, require_as_many
+from heavytop.exact.resolved import resolve
 from heavytop.features.score.diagnose.readings import GivenStart, Observations, Reading, body_data
 from heavytop.features.score.diagnose.samples import floats
 from heavytop.integrate.trajectory import Outcome
@@ -30,7 +31,7 @@ from heavytop.precision import (
     square_root,
 )
 from heavytop.top.attitude import Angle, Attitude, multiple_of_quaternion, perpendicular, rotated, rotation_of
-from heavytop.top.bodies import CENTRE, IDENTITY, Body
+from heavytop.top.bodies import CENTRE, Body
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, VARIABLES, System, system_of
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
 from heavytop.top.inertia_slips import determinant
@@ -50,39 +51,24 @@ def _triple(values: Sequence[Fraction]) -> Vector:
     return first, second, third
 
 
+def _rounded(values: Sequence[Fraction], precision: Precision) -> tuple[Fraction, ...]:
+    return tuple(round_to(value, precision.bits) for value in values)
+
+
 def rounded_body(body: AnyBody, precision: Precision) -> AnyBody:
     """The body with each of its given numbers rounded to the format."""
-
-    def near(values: Sequence[Fraction]) -> Vector:
-        return _triple([round_to(value, precision.bits) for value in values])
-
-    rotor = None if body.rotor is None else near(body.rotor)
+    centre, rotor = _rounded(body.centre, precision), body.rotor and _rounded(body.rotor, precision)
     if isinstance(body, HeavyTop):
-        weight = round_to(body.weight, precision.bits)
-        return HeavyTop(near(body.inertia), weight, near(body.centre), rotor=rotor)
-    mass, gravity = (round_to(value, precision.bits) for value in (body.mass, body.gravity))
-    return Body(
-        mass,
-        gravity,
-        near(body.centre),
-        [near(row) for row in (body.central if body.about == CENTRE else body.tensor)],
-        body.about,
-        rotor,
-    )
+        return HeavyTop(_rounded(body.inertia, precision), round_to(body.weight, precision.bits), centre, rotor)
+    mass, gravity = _rounded([body.mass, body.gravity], precision)
+    tensor = [_rounded(row, precision) for row in (body.central if body.about == CENTRE else body.tensor)]
+    return Body(mass, gravity, centre, tensor, body.about, rotor)
 
 
 def in_principal_axes(body: AnyBody, bits: int) -> tuple[HeavyTop, Tensor]:
     """The body in principal axes, and the rows of A, v_given = A v_principal; irrational axes to so many bits."""
-    if isinstance(body, HeavyTop):
-        return body, IDENTITY
-    principal = body.principal(bits)
-    top = body.top_in(principal)
-    if principal.exact:
-        return top, principal.axes
-    # short numbers in place of long ones, which are not exact anyway
-    centre = [round_to(value, bits) for value in top.centre]
-    rotor = None if top.rotor is None else [round_to(value, bits) for value in top.rotor]
-    return HeavyTop(top.inertia, top.weight, centre, rotor, top.mass), principal.axes
+    resolved = resolve(body, State((0, 0, 0), (0, 0, 1)), bits)
+    return resolved.top, resolved.axes
 
 
 # The start of a file with attitudes: R and Ω as exact numbers, and the body with them in principal axes.
@@ -117,12 +103,8 @@ class RawStart:
 
     def rounded(self, precision: Precision) -> RawStart:
         """These quantities in numbers of a format."""
-
-        def rounded(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
-            return tuple(round_to(value, precision.bits) for value in values)
-
-        a, b, c = rounded(self.omega)
-        return replace(self, values=rounded(self.values), omega=(a, b, c))
+        omega = _triple(_rounded(self.omega, precision))
+        return replace(self, values=_rounded(self.values, precision), omega=omega)
 
 
 def slack_of_start(from_row: bool, precision: Precision) -> Fraction:
