@@ -493,24 +493,19 @@ class Meter:
             replace(problem, start=_moved(problem.start, unit, self._shift))
             for problem, unit in zip(fine, rates, strict=True)
         ]
-        states = self._fine_states([*fine, *moved])
+        times = [number(time, self._fine) for time in self.times]
+        states: list[list[list[Fraction]] | None] = [None] * len(fine + moved)
+        with suppress(OutOfReach):
+            runs = propagate_multiword_ensemble(fine + moved, times, threads=1, step_limit=_STEP_LIMIT)
+            good = [run.outcome is Outcome.SUCCESS for run in runs]
+            states = [
+                [list(map(exact, state)) for state in run.states] if good[i] else None for i, run in enumerate(runs)
+            ]
         references = []
         for unit, true, other in zip(rates, states, states[len(fine) :], strict=False):
             growth = math.inf if true is None or other is None else _growth(true, other, unit, self._shift)
             references.append((true, max(1.0, growth)))
         return references
-
-    def _fine_states(self, problems: Sequence[Problem]) -> list[list[list[Fraction]] | None]:
-        """The states of runs in twice the digits; None for a run that does not reach the horizon."""
-        times = [number(time, self._fine) for time in self.times]
-        try:
-            runs = propagate_multiword_ensemble(problems, times, threads=1, step_limit=_STEP_LIMIT)
-        except OutOfReach:
-            return [None] * len(problems)
-        return [
-            [list(map(exact, state)) for state in run.states] if run.outcome is Outcome.SUCCESS else None
-            for run in runs
-        ]
 
 
 def _error(run: IntegratedRun, true: Sequence[Sequence[Fraction]], unit: Fraction) -> float:
