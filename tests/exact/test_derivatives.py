@@ -16,7 +16,7 @@ from heavytop.exact.enclosure import derivatives as module
 from heavytop.exact.enclosure.derivatives import EnclosedDerivatives, derivatives, step_derivatives
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.enclosure.step import Errors, Node, in_other_bits, start_node, step
-from heavytop.exact.flint.balls import largest_singular_value, radius, relative_bits, working_precision
+from heavytop.exact.flint.balls import largest_singular_value, radius, working_precision
 from support.helpers import in_units
 
 GENERIC = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
@@ -56,42 +56,12 @@ def test_the_laws_of_the_flow_hold_as_narrow_balls(name, time):
 def test_central_differences_of_references_are_inside(name):
     motion, time = motion_of(name), Fraction(7, 3)
     found = of(motion, time, data=True)
-    # of the data, those whose columns follow from the others too
     for matrix, datum, columns in ((found.start, False, (1, 3, 4)), (found.data, True, range(5))):
         for column in columns:
             values = difference(motion, time, column, datum=datum)
             for row, value in zip(matrix, values, strict=True):
                 with working_precision(400):
                     assert holds([row[column] - value])
-
-
-@pytest.mark.parametrize(
-    ("name", "computed", "size"),
-    [
-        ("generic", (1, 2, 4, 5), 1),
-        ("generic", (1, 2, 4, 5), Fraction(1, 10**100)),
-        ("euler", (1, 2, 3, 4, 5), Fraction(10) ** 100),
-        ("hanging", (1, 2, 3, 4), Fraction(10) ** 100),
-        ("gyrostat", (1, 2, 3, 4, 5), Fraction(1, 10**100)),
-        ("heavy gyrostat", (0, 1, 2, 4, 5), Fraction(1, 10**100)),
-    ],
-)
-def test_columns_that_follow_from_others_are_those_that_are_computed(monkeypatch, name, computed, size):
-    """In any unit of mass; without gravity or with a rotor of given momentum fewer laws hold."""
-    top, start, system = MOTIONS[name]
-    rotor = {"rotor": [k * size for k in top.rotor]} if system is HEAVY_GYROSTAT else {}
-    motion = known(HeavyTop([i * size for i in top.inertia], top.weight * size, top.centre, **rotor), start, system)
-    assert module._independent(motion, motion.motion(1)) == computed
-    found = of(motion, Fraction(7, 3), data=True).data
-    monkeypatch.setattr(module, "_independent", lambda *_: tuple(SIX))
-    whole = of(motion, Fraction(7, 3), data=True).data
-    assert all(a.overlaps(b) for row, line in zip(found, whole, strict=True) for a, b in zip(row, line, strict=True))
-    assert min(relative_bits(value) for row in found for value in row) >= BITS
-
-
-def test_a_column_is_computed_where_its_law_would_lose_digits():
-    slow = Validated(HeavyTop((3, 2, 1), "1/1000", ("1/2", "1/3", "1/5")), START)
-    assert module._independent(slow, slow.motion(1)) == (1, 2, 3, 4, 5)
 
 
 @pytest.mark.slow

@@ -140,7 +140,7 @@ def test_a_motion_that_changes_far_faster_than_it_turns_is_refused():
 
 def test_bits_are_given_though_the_forecast_was_too_low(monkeypatch):
     """The schedule of precisions is met at every offset: the last bit asked for counts."""
-    monkeypatch.setattr(Validated, "_forecast", lambda *_: (-8.0, 20.0))
+    monkeypatch.setattr(Validated, "forecast", lambda *_: (-8.0, 20.0))
     solution = motion(VECTORS[0])
     for bits in range(96, 130):
         assert min(map(relative_bits, solution.state(Fraction(3), bits))) >= bits

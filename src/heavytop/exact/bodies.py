@@ -12,12 +12,14 @@ from flint import arb
 
 from heavytop.errors import OutOfReach, quoted, refusal
 from heavytop.exact.catalogue import find, state_and_attitude
-from heavytop.exact.closed_form import starting_at
+from heavytop.exact.closed_form import balls, starting_at
 from heavytop.exact.enclosure.run import EFFORT, Validated
-from heavytop.exact.flint.balls import ball, relative_bits, whole_evaluation, working_precision
+from heavytop.exact.flint.balls import relative_bits, whole_evaluation, working_precision
 from heavytop.exact.resolved import Resolved, resolve
 from heavytop.exact.solution import ExactSolution
+from heavytop.precision import Vector
 from heavytop.top.amplification import amplification
+from heavytop.top.attitude import rotated
 from heavytop.top.bodies import Body
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -158,8 +160,10 @@ def _turned(known: tuple[Resolved, ExactSolution], bits: int, evaluate: Evaluate
 @whole_evaluation
 def _given(resolved: Resolved, values: Sequence[arb], bits: int) -> list[arb]:
     with working_precision(bits):
-        return [
-            sum((ball(a) * x for a, x in zip(row, values[begin : begin + 3], strict=True)), arb(0))
-            for begin in range(0, len(values), 3)
-            for row in resolved.axes
-        ]
+        return in_axes(resolved.axes, values)
+
+
+def in_axes(axes: Sequence[Vector], values: Sequence[arb]) -> list[arb]:
+    """A v of each three components, A by its rows."""
+    parts = (values[begin : begin + 3] for begin in range(0, len(values), 3))
+    return [part for vector in parts for part in rotated([balls(row) for row in axes], vector)]

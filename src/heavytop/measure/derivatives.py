@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any
 
 import msgspec
 import numpy
@@ -12,6 +11,7 @@ from flint import arb
 from numpy.typing import NDArray
 
 from heavytop.errors import InputError, OutOfReach, quoted, refusal
+from heavytop.exact.bodies import in_axes
 from heavytop.exact.enclosure.derivatives import DATA, METHOD, derivatives
 from heavytop.exact.enclosure.run import EFFORT, Validated
 from heavytop.exact.flint.balls import ball, largest_singular_value, value_text, whole_evaluation, working_precision
@@ -109,18 +109,18 @@ def known_derivatives(
     enclosed = derivatives(known, times, bits, which != "start")
     of_start = of_data = lyapunov = None
     if which != "data":
-        matrices = [in_axes(enclosed.start, resolved) for enclosed in enclosed]
+        matrices = [in_given_axes(enclosed.start, resolved) for enclosed in enclosed]
         of_start = [_texts(matrix, time, digits) for matrix, time in zip(matrices, times, strict=True)]
         exponents = [_exponent(matrix, time, bits) for matrix, time in zip(matrices, times, strict=True)]
         lyapunov = [None if value is None else Ball(*value_text(value, digits + 1)) for value in exponents]
     if which != "start":
-        matrices = [in_axes(enclosed.data or [], resolved, scalars=3) for enclosed in enclosed]
+        matrices = [in_given_axes(enclosed.data or [], resolved, scalars=3) for enclosed in enclosed]
         of_data = [_texts(matrix, time, digits) for matrix, time in zip(matrices, times, strict=True)]
     return Derivatives(METHOD, of_start, of_data, lyapunov)
 
 
 @whole_evaluation
-def in_axes(matrix: Balls, resolved: Resolved, scalars: int = 0) -> Balls:
+def in_given_axes(matrix: Balls, resolved: Resolved, scalars: int = 0) -> Balls:
     """A matrix of derivatives, from principal axes to the axes given: A on both sides of each 3 × 3 block.
 
     scalars: leading columns that are not vector components, the principal moments.
@@ -129,18 +129,9 @@ def in_axes(matrix: Balls, resolved: Resolved, scalars: int = 0) -> Balls:
         return matrix
     longest = max(int(value.mid().man_exp()[0]).bit_length() for row in matrix for value in row)
     with working_precision(longest + 64):
-        axes = [[ball(value) for value in row] for row in resolved.axes]
-
-        def rotate(vector: list[Any]) -> list[Any]:
-            return [
-                sum((a * x for a, x in zip(row, vector[begin : begin + 3], strict=True)), arb(0))
-                for begin in range(0, len(vector), 3)
-                for row in axes
-            ]
-
-        columns = [rotate(list(column)) for column in zip(*matrix, strict=True)]
-        rows = [list(row) for row in zip(*columns, strict=True)]
-        return [[*row[:scalars], *rotate(row[scalars:])] for row in rows]
+        columns = [in_axes(resolved.axes, column) for column in zip(*matrix, strict=True)]
+        rows = zip(*columns, strict=True)
+        return [[*row[:scalars], *in_axes(resolved.axes, row[scalars:])] for row in rows]
 
 
 @whole_evaluation

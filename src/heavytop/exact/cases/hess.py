@@ -235,7 +235,7 @@ class HessMotion:
         """
         phase, turns = phase_at(self.gap, self.origin + time)
         u, v = (self.matrix.at(phase, turns) * self.spinor).entries()
-        scale = arb(2) ** -_exponent(abs(u) + abs(v))
+        scale = 1 / (abs(u) + abs(v)).mid()
         return self._state(*solved((phase, u * scale, v * scale), self._rates))
 
     @cached_per_precision
@@ -269,14 +269,6 @@ class HessMotion:
         i1, _, i3 = map(ball, self.level.inertia)
         z = s / self.size
         return [c * x / i1, y, -a * x / i3, c * across[0] + a * z, across[1], c * z - a * across[0]]
-
-
-def _exponent(value: arb) -> int:
-    """About log2 of a positive ball; 0 where it is not finite."""
-    if not value.is_finite() or value.is_zero():
-        return 0
-    mantissa, power = value.mid().man_exp()
-    return int(power) + int(mantissa).bit_length()
 
 
 # Hess' tops, M·γ = 0: elementary in the angle of a pendulum.

@@ -19,11 +19,6 @@ more than J(t), to which digits are relative, while W, also an error of Φ, has 
 computed beside each step of the motion, along a polynomial in their own bits
 (:func:`heavytop.exact.enclosure.step.in_other_bits`).  Both precisions are chosen so as to leave the
 requested digits, and raised by the missing bits, up to six times.
-
-One or two columns of S follow from the others.  A body of c times the mass moves as before, unless it has a rotor of
-given momentum; and γ and n enter by their products, so that from (Ω0, c γ0) with n/c the motion is (Ω, c γ):
-
-    Σ I_j ∂y/∂I_j + Σ n_j ∂y/∂n_j = 0,     Σ n_j ∂y/∂n_j = Σ γ0_j ∂y/∂γ0_j − (0, γ).                            (c)
 """
 
 from __future__ import annotations
@@ -32,7 +27,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import exp, inf, lcm
-from operator import mul
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -144,7 +138,7 @@ class Tangent:
     """The data that derivatives are computed with, in ulps of 2^-precision, along the motion of ``field``.
 
     certified, columns: Taylor coefficients of the motion, and of its derivatives, in words; None in integers.
-    data: those of :data:`DATA` in ``indices``, whose columns are computed.
+    data: those of :data:`DATA`, or none.
     """
 
     field: Quadratic
@@ -153,7 +147,6 @@ class Tangent:
     certified: CertifiedSeries | None
     columns: CertifiedColumns | None
     data: tuple[Datum, ...] = ()
-    indices: tuple[int, ...] = ()
 
     @property
     def width(self) -> int:
@@ -332,20 +325,18 @@ def slope(system: System, p: Parameters, datum: int, unit: Fraction) -> Callable
 
 METHOD = "validated: variational equation on the Taylor enclosure"
 _UP = 1 + 2.0**-32
-Centre: TypeAlias = tuple[list[list[mpz]], Matrix, int, tuple[Step, Fraction, Matrix]]
-"""(J, S) in ulps, bounds of its errors in ulps 2^exponent, the exponent; the step, τ, and its radii there."""
+Centre: TypeAlias = tuple[list[list[mpz]], Matrix, int]
+"""(J, S) in ulps, bounds of its errors in ulps 2^exponent, the exponent."""
 _UNIT = 2.0**-53
 _ATTEMPTS = 6
 _GUARD = 18
 """Bits beyond the requested ones, for the losses of bounds and of short motions."""
 _OF_COLUMNS, _MOST_OF_COLUMNS = 13, 60
 """Bits that Φ and σ lose where the motion loses few; and the loss of a motion beyond which they lose no more."""
-_OF_DATA = 8
+_OF_DATA = 12
 """Spare bits for S, which has fewer than J: they cost less than a second run."""
-_OF_LAWS = 4
-"""Bits that a column of S may lose where it follows from the others."""
 _FEW = 4
-_SMALLER = 4
+_SMALLER = 2
 _SHORTENED = 4
 _TINY = 2.0**-190
 _seen_right: set[tuple[Grid, str, bool]] = set()
@@ -407,22 +398,20 @@ def _one_way(
     motion = known.motion(direction)
     time = direction * spans[-1]
     loss, steps = known.forecast(time, bits)
-    indices = _independent(known, motion) if data else ()
-    spare = (_OF_DATA + _OF_LAWS * (len(indices) < len(DATA))) * data
-    bits_of_motion = bits + loss + _GUARD + spare + int(min(loss, _FEW * bits) / 4)
+    bits_of_motion = bits + loss + _GUARD + _OF_DATA * data + int(min(loss, _FEW * bits) / 4)
     bits_of_columns = bits + _OF_COLUMNS + 0.9 * min(loss, _MOST_OF_COLUMNS)
     for _ in range(_ATTEMPTS):
-        columns = steps * (7 + len(indices))
+        columns = steps * (7 + len(DATA) * data)
         of_columns = motion.precision(bits_of_columns, columns)
         planned = max(motion.precision(bits_of_motion, steps), of_columns)
         if not motion.seconds(planned, loss, steps) + columns * seconds_a_step(*of_columns) < known.effort:
             break
-        tangent = _tangent(known, motion, *of_columns, indices)
+        tangent = _tangent(known, motion, *of_columns, data)
         start = start_node(motion.field, motion.scaled.state, planned[0])
         run = EnclosureRun(motion, planned[0], (start,), motion.certified(planned[0]) if planned[1] else None)
         enclosed, lacking = {}, 0
         for span, values in _run(tangent, run, spans):
-            at = _in_units(known, motion, tangent, values) if values else None
+            at = _in_units(motion, tangent, values) if values else None
             lacking = bits - (
                 min(relative_bits(v) for m in (at.start, at.data or []) for r in m for v in r) if at else 0
             )
@@ -438,22 +427,8 @@ def _one_way(
     )
 
 
-def _independent(known: Validated, motion: ScaledMotion) -> tuple[int, ...]:
-    """The data whose columns do not follow by (c), each law for the largest of its data."""
-    p, gamma = known.parameters, known.start.gamma
-    moment = max(range(3), key=lambda k: abs(p.moment[k]))
-    inertia = max(range(3), key=lambda k: p.inertia[k])
-    threshold = max(map(abs, gamma)) * min(p.inertia) * motion.scaled.rate**2 / 2**_OF_LAWS
-    left_out = {3 + moment} if "moment" in known.system.enters and abs(p.moment[moment]) > threshold else set()
-    if not (isinstance(p.rotor, tuple) and any(p.rotor)):
-        left_out.add(inertia)
-    return tuple(k for k in range(len(DATA)) if k not in left_out)
-
-
-def _tangent(
-    known: Validated, motion: ScaledMotion, precision: int, in_words: bool, indices: tuple[int, ...]
-) -> Tangent:
-    data = _data(known, motion, indices)
+def _tangent(known: Validated, motion: ScaledMotion, precision: int, in_words: bool, with_data: bool) -> Tangent:
+    data = _data(known, motion) if with_data else []
     data_of = tuple(datum for datum, _ in data)
     together = Together.of(motion.field, [datum.field for datum in data_of])
     lanes = [lanes_of_datum for _, lanes_of_datum in data if lanes_of_datum is not None]
@@ -462,15 +437,15 @@ def _tangent(
     if grid is not None and not grid.relative and len(lanes) == len(data):
         certified = motion.certified(precision)
         columns = CertifiedColumns(certified, lanes) if certified else None
-    tangent = Tangent(motion.field, precision, together, certified, columns, data_of, indices)
+    tangent = Tangent(motion.field, precision, together, certified, columns, data_of)
     _require_right(tangent, motion)
     return tangent
 
 
 @whole_evaluation
-def _data(known: Validated, motion: ScaledMotion, indices: Sequence[int]) -> list[tuple[Datum, Coefficients | None]]:
+def _data(known: Validated, motion: ScaledMotion) -> list[tuple[Datum, Coefficients | None]]:
     with series_length(2):
-        return [_datum(known, motion, k) for k in indices]
+        return [_datum(known, motion, k) for k in range(len(DATA))]
 
 
 def _datum(known: Validated, motion: ScaledMotion, datum: int) -> tuple[Datum, Coefficients | None]:
@@ -604,14 +579,13 @@ def _at(tangent: Tangent, taken: Step, own: StepDerivatives, columns: _Columns, 
         _product(tangent, own, columns.rows),
         np.asarray((radii + _local(tangent, own, columns)) * _UP),
         columns.exponent,
-        (taken, tau, taken.radii(tau)),
     )
 
 
 @whole_evaluation
-def _in_units(known: Validated, motion: ScaledMotion, tangent: Tangent, values: Centre) -> EnclosedDerivatives:
+def _in_units(motion: ScaledMotion, tangent: Tangent, values: Centre) -> EnclosedDerivatives:
     """The derivatives as balls, in the input units."""
-    rows, radii, exponent, (taken, tau, around) = values
+    rows, radii, exponent = values
     sizes = motion.scaled.sizes
     scales = [*sizes, *(datum.unit for datum in tangent.data)]
     limits = [[float(r) for r in row] for row in radii]
@@ -626,22 +600,4 @@ def _in_units(known: Validated, motion: ScaledMotion, tangent: Tangent, values: 
             for line, bounds, size in zip(rows, limits, sizes, strict=True)
         ]
         start, data = [line[: len(rows)] for line in table], [line[len(rows) :] for line in table]
-        if len(tangent.indices) in (0, len(DATA)):
-            return EnclosedDerivatives(start, data if tangent.data else None)
-        state = [value * ball(size) for value, size in zip(taken.around(tau, around), sizes, strict=True)]
-        return EnclosedDerivatives(start, _completed(known, tangent.indices, state, start, data))
-
-
-def _completed(known: Validated, indices: Sequence[int], state: list[arb], start: Balls, data: Balls) -> Balls:
-    """S from its columns of ``indices``, by (c)."""
-    size = [ball(value) for value in (*known.parameters.inertia, *known.parameters.moment)]
-    gamma = [ball(value) for value in known.start.gamma]
-    completed = []
-    for i, (of_start, of_data) in enumerate(zip(start, data, strict=True)):
-        row = dict(zip(indices, of_data, strict=True))
-        for k in (k for k in (3, 4, 5, 0, 1, 2) if k not in indices):
-            others = [j for j in range(3 if k > 2 else 0, len(DATA)) if j != k]
-            total = sum(map(mul, gamma, of_start[3:]), -state[i] if i > 2 else arb(0)) if k > 2 else arb(0)
-            row[k] = (total - sum((size[j] * row[j] for j in others), arb(0))) / size[k]
-        completed.append([row[k] for k in range(len(DATA))])
-    return completed
+        return EnclosedDerivatives(start, data if tangent.data else None)

@@ -427,7 +427,7 @@ class Validated:
         if self.level:
             object.__setattr__(self, "method", f"{_METHOD}, as no closed form covers the level ({self.level})")
         object.__setattr__(self, "unit", unit_of_time(self.parameters, self.start.flat))
-        motion = self._motion(1, self.start.flat)
+        motion = self.motion(1)
         rate = coefficient_bound(motion.field, max(map(abs, motion.scaled.state)))
         if rate > _LARGEST_RATE:
             raise OutOfReach(
@@ -449,12 +449,23 @@ class Validated:
         """
         return self._enclosure(time, bits, self.start.flat)
 
-    def cost(self, time: Fraction, bits: int, most: float | None = None) -> float:
+    def cost(
+        self,
+        time: Fraction,
+        bits: int,
+        most: float | None = None,
+        start: tuple[Fraction, ...] | None = None,
+        loss: float = 0.0,
+    ) -> float:
         """Seconds of the model of the cost that the state at ``time`` takes: steps times bits, by no clock.
 
         most: a pilot ends early where the cost exceeds this by a fifth; None for eight times the effort.
+        start: as for :meth:`motion`.  loss: bits that are lost at least.
         """
-        return 0.0 if time == 0 else self._cost(time, bits, self.start.flat, most=most)
+        if time == 0:
+            return 0.0
+        forecast, steps = self.forecast(time, bits, start, most)
+        return self.motion(1 if time > 0 else -1, start).seconds_for(bits, max(loss, forecast), steps)
 
     def reached(self) -> Fraction:
         """The |t| that the latest enclosure has reached, for displays of progress; safe in threads."""
@@ -468,9 +479,9 @@ class Validated:
         errors grow too large.  Raises OutOfReach as :meth:`state` does.
         """
         direction = 1 if time > 0 else -1
-        motion = self._motion(direction, self.start.flat)
+        motion = self.motion(direction)
         span = abs(time) * motion.scaled.rate
-        loss, steps = self._forecast(direction, span, self.start.flat, bits)
+        loss, steps = self.forecast(time, bits)
         planned = motion.precision(bits + loss, steps)
         if motion.seconds(planned, loss, steps) > self.effort:
             raise self._refusal(time, self._reachable(time, bits, loss, self.start.flat))
@@ -499,18 +510,12 @@ class Validated:
             parameters = self.parameters.mapped(ball)
             return solved(values, lambda y: self.system.field(parameters, y))
 
-    def motion(self, direction: int) -> ScaledMotion:
-        """The motion of (Ω, γ) in scaled units, forwards or backwards in time."""
-        return self._motion(direction, self.start.flat)
+    def motion(self, direction: int, start: tuple[Fraction, ...] | None = None) -> ScaledMotion:
+        """The motion in scaled units, forwards or backwards in time.
 
-    def forecast(self, time: Fraction, bits: int) -> tuple[float, float]:
-        """Forecast of (bits lost, steps) up to ``time``, where ``bits`` bits are to be left."""
-        direction = 1 if time > 0 else -1
-        span = abs(time) * self.motion(direction).scaled.rate
-        return self._forecast(direction, span, self.start.flat, bits)
-
-    def _motion(self, direction: int, start: tuple[Fraction, ...]) -> ScaledMotion:
-        """The motion of ``start``, y or (y, ξ), in scaled units."""
+        start: (Ω, γ, ξ); None for (Ω, γ).
+        """
+        start = start or self.start.flat
         key = (direction, len(start))
         if key not in self._motions:
             motion = ScaledMotion.of(self.system, self.parameters, start, direction > 0)
@@ -522,7 +527,7 @@ class Validated:
     def _run(self, direction: int, start: tuple[Fraction, ...], precision: int, in_words: bool) -> EnclosureRun:
         key = (direction, precision, in_words, len(start))
         if key not in self._runs:
-            motion = self._motion(direction, start)
+            motion = self.motion(direction, start)
             certified = motion.certified(precision) if in_words else None
             errors = () if self.uncertainty is None else self.uncertainty.start[: len(start)]
             scaled = [error / size for error, size in zip(errors, motion.scaled.sizes[: len(errors)], strict=True)]
@@ -534,9 +539,9 @@ class Validated:
         if time == 0:
             return _rounded(start, bits + 8, () if self.uncertainty is None else self.uncertainty.start)
         direction = 1 if time > 0 else -1
-        motion = self._motion(direction, start)
+        motion = self.motion(direction, start)
         span, sizes = abs(time) * motion.scaled.rate, motion.scaled.sizes
-        loss, steps = self._forecast(direction, span, start, bits)
+        loss, steps = self.forecast(time, bits, start)
         pilot = self._pilot(direction, start, bits)
         run = pilot.run if pilot.reaches(span, bits) else None
         for _ in range(_ATTEMPTS):
@@ -556,9 +561,25 @@ class Validated:
             run = None
         raise self._refusal(time, 0)
 
+    def forecast(
+        self, time: Fraction, bits: int, start: tuple[Fraction, ...] | None = None, most: float | None = None
+    ) -> tuple[float, float]:
+        """Forecast of (bits lost, steps) up to ``time``, where ``bits`` bits are to be left.
+
+        start: as for :meth:`motion`.  most: as for :meth:`cost`.
+        """
+        direction, start = 1 if time > 0 else -1, start or self.start.flat
+        motion, pilot = self.motion(direction, start), self._pilot(direction, start, bits)
+        span = abs(time) * motion.scaled.rate
+        if most is None:
+            a_step = seconds_a_step(pilot.run.precision, pilot.run.certified is not None)
+            return pilot.forecast(span, lambda _, steps: steps * a_step > _HOPELESS * self.effort)
+        limit = _SURELY * most
+        return pilot.forecast(span, lambda lost, steps: motion.seconds_for(bits, lost, steps) > limit)
+
     def _pilot(self, direction: int, start: tuple[Fraction, ...], bits: int) -> Pilot:
         """The pilot, in the bits of short motions where these are few."""
-        motion = self._motion(direction, start)
+        motion = self.motion(direction, start)
         precision, in_words = motion.precision(bits + _PILOT_ROOM, inf)
         if not in_words or precision > _MOST_PILOT_BITS:
             precision, in_words = motion.precision(_PILOT_BITS, inf)
@@ -569,30 +590,10 @@ class Validated:
             self._pilots.setdefault(key, Pilot(run, Ahead(run.nodes[0])))
         return self._pilots[key]
 
-    def _forecast(
-        self, direction: int, span: Fraction, start: tuple[Fraction, ...], bits: int, most: float | None = None
-    ) -> tuple[float, float]:
-        """Forecast of (bits lost, steps) up to ``span``, where ``bits`` bits are to be left."""
-        pilot = self._pilot(direction, start, bits)
-        if most is None:
-            a_step = seconds_a_step(pilot.run.precision, pilot.run.certified is not None)
-            return pilot.forecast(span, lambda _, steps: steps * a_step > _HOPELESS * self.effort)
-        motion, limit = self._motion(direction, start), _SURELY * most
-        return pilot.forecast(span, lambda lost, steps: motion.seconds_for(bits, lost, steps) > limit)
-
-    def _cost(
-        self, time: Fraction, bits: int, start: tuple[Fraction, ...], loss: float = 0.0, most: float | None = None
-    ) -> float:
-        """Seconds of the model, as :meth:`cost`; loss: bits that are lost at least."""
-        direction = 1 if time > 0 else -1
-        motion = self._motion(direction, start)
-        forecast, steps = self._forecast(direction, abs(time) * motion.scaled.rate, start, bits, most)
-        return motion.seconds_for(bits, max(loss, forecast), steps)
-
     def _reachable(self, time: Fraction, bits: int, loss: float, start: tuple[Fraction, ...]) -> int:
         """A number of bits below ``bits`` within the effort."""
         reachable = bits * 15 // 16
-        while reachable > 0 and self._cost(time, reachable, start, loss) > self.effort:
+        while reachable > 0 and self.cost(time, reachable, start=start, loss=loss) > self.effort:
             reachable = reachable * 15 // 16
         return reachable
 

@@ -274,26 +274,10 @@ def even_rows(values: Callable[[arb], list[arb]], terms: int) -> list[list[arb]]
     rows: list[list[arb]] = []
     for even, odd in zip(samples[::2], [*samples[1::2], samples[-1]], strict=False):
         # all coefficients are real, so two functions fit into one transform
-        product = _cosine_sums([acb(a, b) for a, b in zip(even, odd, strict=True)], cosines)
+        values_of_both = [acb(a, b) for a, b in zip(even, odd, strict=True)]
+        product = acb.dft(values_of_both + values_of_both[-2:0:-1])[:half]
         rows += [[c.real / terms for c in product], [c.imag / terms for c in product]]
     return rows[: len(samples)]
-
-
-def _cosine_sums(values: list[acb], cosines: list[arb]) -> list[acb]:
-    """C_k = Σ_j x_j cos(2πjk/N), j < N, k < N/2, of an even x by a transform of half the length.
-
-    values: x_0 .. x_(N/2).  cosines: of 2πj/N.  With M = N/2, E_k and O_k the sums over even and odd j, C_k = E_k + O_k
-    and C_(M−k) = E_k − O_k; x_2i + i (x_(2i+1) − x_(2i−1)) has the transform E_k − 2 sin(2πk/N) O_k.
-    """
-    half = len(values) - 1
-    full = values + values[-2:0:-1]
-    spectrum = acb.dft([full[2 * i] + acb(0, 1) * (full[2 * i + 1] - full[2 * i - 1]) for i in range(half)])
-    sums = [acb(0)] * (half + 1)
-    for k in range(half // 2 + 1):
-        mean, apart = (spectrum[k] + spectrum[-k]) / 2, (spectrum[-k] - spectrum[k]) / 2
-        odd = apart / (2 * cosines[half // 2 - k]) if k else sum(full[1::2], acb(0))
-        sums[k], sums[half - k] = mean + odd, mean - odd
-    return sums[:half]
 
 
 # A variable asymptotic to a double root of a polynomial, and its Abel integrals with error bounds.
@@ -344,7 +328,8 @@ class Approach:
     def _rows(self, count: int) -> list[list[arb]]:
         """Fourier coefficients of q_j, as means of q_j cos 2nχ."""
         polynomial = self.rest.polynomial(self.limit)
-        quotient = _divided(polynomial, self.limit)
+        # (g(v) − g(e))/(v − e)
+        quotient = polynomial // arb_poly([-self.limit, 1])
         at_limit = self.column[0]
 
         def values(v: arb) -> list[arb]:
@@ -389,16 +374,6 @@ def _sines(means: list[arb]) -> list[arb]:
     for k, (cosine, following) in enumerate(zip(cosines, [*cosines[1:], arb(0)], strict=True)):
         sums += [((2 * cosine if k == 0 else cosine) + following) / (2 * (2 * k + 1)), arb(0)]
     return sums
-
-
-def _divided(polynomial: arb_poly, point: arb) -> arb_poly:
-    """(g(v) − g(e))/(v − e) as a polynomial in v, by Horner's scheme."""
-    quotients: list[arb] = []
-    value = arb(0)
-    for coefficient in reversed(polynomial.coeffs()[1:]):
-        value = value * point + coefficient
-        quotients.append(value)
-    return arb_poly(quotients[::-1])
 
 
 # Attitude of a motion with a variable in one gap: the azimuth of a vector about the vertical is one more integral.
