@@ -54,18 +54,6 @@ def line_of(*points: tuple[int, float]) -> WorkPrecisionLine:
     return WorkPrecisionLine("x", "double", [WorkPrecisionPoint(*point, "") for point in points])
 
 
-def test_between_rungs_a_straight_line_on_logarithmic_axes() -> None:
-    line = line_of((-8, 1.0), (-12, 100.0))
-    assert [line.seconds_at(log10) for log10 in (-6, -10, -12)] == pytest.approx([1, 10, 100])
-    assert line.seconds_at(-13) is None
-
-
-def test_a_line_that_turns_back_takes_the_least_time() -> None:
-    line = line_of((-8, 1.0), (-12, 4.0), (-9, 50.0))
-    assert line.seconds_at(-10) == pytest.approx(2)
-    assert line.best == WorkPrecisionPoint(-12, 4.0, "")
-
-
 def test_the_lead_is_over_the_best_peer_that_gets_there() -> None:
     (lead,) = leads(ALL)
     assert (lead.case, lead.other) == ("top/T=9", "cyrk:DOP853")
@@ -174,20 +162,6 @@ def test_whoever_is_fastest_is_named(rows: list[Row], short: str) -> None:
     assert lead.short == f"At 1e-30 {short}"
 
 
-def test_cases_formats_and_failures_are_kept_apart() -> None:
-    other = [
-        row("heyoka tolerance=eps", -30, 9.0, precision="quad"),
-        row("heyoka tolerance=1e-3", -3, 9.0, case="b/T=1"),
-    ]
-    found = panels(ALL + other)
-    assert {case: [line.label for line in lines] for case, lines in found.items()} == {
-        "top/T=9": ["heyoka double", "cyrk:DOP853", "splitting:4", "sundials:CVODE", "heyoka:lanes", "heyoka quad"],
-        "b/T=1": ["heyoka double"],
-    }
-    failed = found["top/T=9"][3]
-    assert (failed.points, failed.failures) == ([], [0.1])
-
-
 def test_the_summary_says_it() -> None:
     text = shown(summary(report(*ALL)), 160)
     assert "4.5 × as fast as the best other integrator, cyrk:DOP853" in text
@@ -257,12 +231,6 @@ def test_every_picture_is_a_file_as_svg_and_as_pdf(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no rows to draw"):
         draw_report(report(), tmp_path / "none", KINDS)
     assert not (tmp_path / "none").exists()
-
-
-def test_a_hostile_name_is_text() -> None:
-    rows = [row("<script>alert(1)</script>:x$ tolerance=1", -3, 1.0, case='<b>"&$_{$')]
-    assert "<script" not in drawn(rows).svg
-    assert "<b>" not in drawn(rows).svg
 
 
 def test_one_beside_heyoka_is_a_table_with_a_line_a_rung() -> None:

@@ -38,14 +38,6 @@ def test_only_the_last_two_decades_count() -> None:
     assert found.exponent == pytest.approx(1, abs=1e-5)
 
 
-def test_an_error_that_swings_through_zero_is_bounded_and_one_that_swings_and_grows_is_not() -> None:
-    swing = abs(numpy.sin(7 * T)) + 1e-6
-    assert trend(series(1e-8 * swing)).law == "bounded"
-    growing = trend(series(1e-8 * T**2 * swing))
-    assert growing.exponent > 1
-    assert growing.law != "bounded"
-
-
 def test_a_law_that_another_takes_over_from_is_not_named() -> None:
     found = trend(series(1e-12 * T + 1e-15 * T**2))
     assert found.halves[0] < 1.3 < 1.6 < found.halves[1]
