@@ -12,13 +12,14 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from fractions import Fraction
 from io import StringIO
-from multiprocessing import active_children
+from multiprocessing import Pipe, active_children
 from pathlib import Path
 
 import msgspec
 import pytest
 from rich.console import Console
 
+from heavytop import processes
 from heavytop.errors import HeavyTopError, InputError
 from heavytop.features.kinds import KINDS
 from heavytop.harness import run
@@ -148,6 +149,19 @@ def test_a_run_begins_a_few_tasks_at_a_time_and_does_not_wait_for_them_where_it_
         process.join()
     assert not (tmp_path / "done").exists()
     assert len(asked) <= 4 * 2
+
+
+def test_a_process_ends_with_its_parent_and_no_sooner(monkeypatch: pytest.MonkeyPatch) -> None:
+    ended: list[int] = []
+    monkeypatch.setattr(processes.os, "_exit", ended.append)
+    child, parent = Pipe(duplex=False)
+    waiting = threading.Thread(target=processes._end_with, args=(child,))
+    waiting.start()
+    waiting.join(0.1)
+    assert (waiting.is_alive(), ended) == (True, [])
+    parent.close()
+    waiting.join(10)
+    assert (waiting.is_alive(), ended) == (False, [1])
 
 
 def test_processes_end_when_their_parent_is_killed_in_the_midst_of_a_row_too(tmp_path: Path) -> None:
