@@ -117,6 +117,7 @@ def test_two_runs_of_a_plan_are_the_same_but_for_timings(finished: Path) -> None
     assert one["rows"] == two["rows"]
     assert {row["outcome"] for row in one["rows"]} == {"success"}
     assert json.loads(printed("compare", "one", "two", "--json", cwd=finished))["verdict"] == "same"
+    assert printed("compare", "one", "two", cwd=finished).startswith("Verdict: same (")
 
 
 def test_a_command_that_is_printed_can_be_pasted(finished: Path, tmp_path: Path) -> None:
