@@ -20,7 +20,6 @@ from heavytop.features.claims.algebra.reader import FUNCTIONS
 from heavytop.features.claims.algebra.ring import used
 from heavytop.features.claims.algebra.signs import Sign
 from heavytop.features.claims.algebra.statement import AFTER, ALL, BEFORE, Domain, Flow, Formulas, Statement
-from heavytop.features.claims.algebra.structure import sign_of as sign_by_structure
 from heavytop.features.claims.audit.judge import judge
 from support.claim_algebra import A, P, Q, T, region_of, setting, sign_of, statement
 from support.claim_tables import audited, integral, top
@@ -398,7 +397,7 @@ def test_a_power_of_a_rate_in_the_ideal_keeps_no_relation(is_relation: bool, hol
     ],
 )
 def test_a_bounded_function_counts_with_its_bound(expression: sympy.Expr, expected: tuple[int, bool]) -> None:
-    value, strict = sign_by_structure(expression)
+    value, strict = sign_of(expression)
     assert value == expected[0]
     assert strict <= expected[1]
 

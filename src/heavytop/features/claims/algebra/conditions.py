@@ -17,8 +17,8 @@ from heavytop.features.claims.algebra.elliptic import JACOBI, modulus, wpinverse
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Assumptions, Field, SolvedRelation
 from heavytop.features.claims.algebra.ring import as_fraction, used, where_provable
-from heavytop.features.claims.algebra.signs import Sign
-from heavytop.features.claims.algebra.structure import Defined, at_values, rationals, sign_of
+from heavytop.features.claims.algebra.signs import UNKNOWN, Sign
+from heavytop.features.claims.algebra.structure import Defined, at_values, rationals
 
 _LONGEST = 120
 _BITS = 512
@@ -204,6 +204,15 @@ _ANALYTIC = (sympy.sin, sympy.cos, sympy.exp, sympy.sinh, sympy.cosh, sympy.tanh
 # a polynomial of more terms is left as it is
 _MOST_TERMS = 1_000
 _MOST_PRODUCTS = 16
+
+
+@lru_cache(maxsize=1_000)
+@where_provable(UNKNOWN)
+def sign_of(e: sympy.Expr) -> Sign:
+    """The sign of an expression where it is defined and real, for all values of its symbols."""
+    positive = tuple(symbol for symbol in e.free_symbols if symbol.is_positive)
+    field = Field(Assumptions(sympy.Dummy("t", real=True), positive), [e])
+    return field.tower.sign(field.enter(e))
 
 
 def conditions_for_zero(e: sympy.Expr) -> tuple[sympy.Expr, ...]:

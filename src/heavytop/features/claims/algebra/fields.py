@@ -247,11 +247,6 @@ class Field:
             zeros.append(relation)
         return [relation for relation in zeros if relation]
 
-    @where_provable(False)
-    def vanishes_on(self, expression: sympy.Expr, zero: sympy.Expr) -> bool:
-        """True only where the expression is a multiple of the polynomial ``zero``, off the tower's divisors."""
-        return bool(not divmod(self.enter(expression).numerator, self.enter(zero).numerator)[1])
-
     def is_constant(self, value: Quotient) -> bool:
         """Whether the quotient has only generators that are constant in time."""
         return all(self.tower.generators[i].constant for i in used(value.numerator) | used(value.denominator))

@@ -27,9 +27,8 @@ from heavytop.features.claims.algebra.conditions import (
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Field, Regularity
 from heavytop.features.claims.algebra.ring import Quotient, Unprovable, used, where_provable
-from heavytop.features.claims.algebra.signs import NUMBER_BITS, PLUS, value_of
+from heavytop.features.claims.algebra.signs import NUMBER_BITS, PLUS, sum_of, value_of
 from heavytop.features.claims.algebra.statement import Domain, Flow, Point, Setting, Statement
-from heavytop.features.claims.algebra.structure import sign_of
 from heavytop.precision import shown
 
 # The proof of one statement: an identity of the algebra, and the conditions under which it proves the statement.
@@ -85,7 +84,6 @@ class Region:
         self.sample_points = [point for point in sample_points if self._holds(point)]
         self.answers: dict[str, dict[str, bool]] = {}
         self._divisors: dict[tuple[bool, str], bool] = {}
-        self._needs = statement.formulas.needs
         self.regularity = Regularity(field, self.is_nowhere_zero)
         # polynomials that the flow keeps from 0 may divide the domain
         self.everywhere = Regularity(field) if statement.flow is not None else self.regularity
@@ -145,16 +143,6 @@ class Region:
             return "its rate is not shown to be 0 there"
         divisor = next(region.divisors(forced=True), "")
         return divisor and f"its rate is divided by {divisor}, which may be 0 there"
-
-    def _is_excluded(self, p: fmpq_mpoly) -> bool:
-        """A need of the claim as written has the factor p, so p is not 0, and p keeps its sign."""
-        for need in self._needs:
-            if need.kind is not ConditionKind.NONNEGATIVE:
-                with suppress(Unprovable):
-                    value = self.field.enter(need.expression)
-                    if value.denominator == self.field.tower.one and not divmod(value.numerator, p)[1]:
-                        return self.is_kept(p)
-        return False
 
     @_answered_once
     def is_zero_nowhere_dense(self, p: fmpq_mpoly) -> bool:
@@ -250,9 +238,14 @@ class Region:
 
     @where_provable("")
     def _discharge(self, need: Need) -> str:
-        if need.kind.is_met_by(sign_of(need.expression)):
+        # a quotient is 0 only where its numerator is
+        e = sympy.numer(need.expression) if need.kind is ConditionKind.NONZERO else need.expression
+        # as a sum of squares, which its expansion hides
+        if need.kind.is_met_by(
+            sum_of(self.field.tower.sign(self.field.enter(part)) for part in sympy.Add.make_args(e))
+        ):
             return _EVERYWHERE
-        value = self.field.enter(need.expression)
+        value = self.field.enter(e)
         factors = self._factors(value.numerator) if need.kind is ConditionKind.NONZERO and value.numerator else []
         is_nonzero = bool(factors) and all(map(self._is_never_zero, factors))
         if is_nonzero or need.kind.is_met_by(self.field.tower.sign(value)):
@@ -354,9 +347,7 @@ class Region:
         for text, p in list(self.field.tower.divisors.items()):
             if (forced, text) not in self._divisors:
                 self._divisors[forced, text] = (
-                    all(self._is_never_zero(factor) or self._is_excluded(factor) for factor in self._factors(p))
-                    if forced
-                    else self.is_zero_nowhere_dense(p)
+                    all(map(self._is_never_zero, self._factors(p))) if forced else self.is_zero_nowhere_dense(p)
                 )
             if not self._divisors[forced, text]:
                 try:
@@ -485,9 +476,7 @@ class Prover:
         if region is None:
             return None
         flow = statement.flow
-        if region.vanishes(statement.residual) or (
-            flow is not None and any(region.field.vanishes_on(statement.residual, zero) for zero in flow.always)
-        ):
+        if region.vanishes(statement.residual):
             # on the relations a divisor may be 0 everywhere, though it is not elsewhere
             return list(region.divisors(forced=flow is not None and bool(self._setting.relations)))
         radical = flow is None or not flow.is_relation

@@ -16,7 +16,7 @@ from flint import arb, fmpq, fmpq_mpoly
 
 from heavytop.exact.flint.balls import working_precision
 from heavytop.features.claims.algebra.combinations import nonnegative_combination
-from heavytop.features.claims.algebra.ring import Generator, PolynomialRing, Unprovable, as_fraction, used
+from heavytop.features.claims.algebra.ring import PolynomialRing, Unprovable, as_fraction, used
 
 NUMBER_BITS = 512
 """Working precision of the balls of generators that are numbers."""
@@ -108,7 +108,6 @@ class Signs:
         self._left = _BUDGET
         self._depth = 0
         self._programs = _PROGRAMS
-        self._half_angles: dict[int, int] = {}
         self.ranges: dict[int, tuple[Fraction, Fraction]] = {}
         self.circles: dict[int, int] = {}
         self.numbers: dict[int, arb] = {}
@@ -237,8 +236,7 @@ class Signs:
         yield from (self._by_facts, self._by_number, self._by_terms, self._by_forms)
         if len(p) <= _MAX_COSTLY_TERMS and self._left > 0:
             yield from (self._by_square_of_a_sine, self._by_roots_of_one_variable, self._by_generators)
-            yield from (self._by_half_angle, self._by_difference_from_facts, self._by_products_of_facts)
-            yield self._by_squares
+            yield from (self._by_difference_from_facts, self._by_products_of_facts)
 
     # --- rules ------------------------------------------------------------------------------------------------------
 
@@ -320,32 +318,20 @@ class Signs:
         return total
 
     def _by_roots_of_one_variable(self, p: fmpq_mpoly) -> Sign:
-        """Irreducible polynomials in one generator without a real root in its range (Sturm)."""
+        """Irreducible polynomials in one generator without a real root inside its range (Sturm)."""
         if len(used(p)) != 1:
             return UNKNOWN
         (index,) = used(p)
         low, high = self._range(index)
         x = sympy.Symbol("x")
         polynomial = sympy.Poly(sum(as_fraction(c) * x ** int(m[index]) for m, c in p.to_dict().items()), x)
-        if polynomial.degree() == 1:
-            return self._line(polynomial, low, high).also(Sign(0, self._by_other_of_circle(index, polynomial)))
-        if polynomial.count_roots(low, high):
-            return UNKNOWN
-        inside = low if low is not None else high if high is not None else sympy.Integer(0)
-        return sign_of_number(polynomial.eval(inside))
-
-    def _line(self, polynomial: Any, low: Any, high: Any) -> Sign:
-        """a x + b on a closed interval or ray."""
-        slope, _ = polynomial.all_coeffs()
-        ends = [polynomial.eval(end) if end is not None else None for end in (low, high)]
-        if slope < 0:
-            ends.reverse()
-        lowest, highest = ends
-        if lowest is not None and lowest >= 0:
-            return Sign(1, bool(lowest > 0))
-        if highest is not None and highest <= 0:
-            return Sign(-1, bool(highest < 0))
-        return UNKNOWN
+        ends = [end for end in (low, high) if end is not None]
+        at_ends = [polynomial.eval(end) for end in ends]
+        line = Sign(0, polynomial.degree() == 1 and self._by_other_of_circle(index, polynomial))
+        if polynomial.count_roots(low, high) > at_ends.count(0):
+            return line
+        inside = sum(ends) / 2 if len(ends) == 2 else 0 if not ends else low + 1 if high is None else high - 1
+        return Sign(sign_of_number(polynomial.eval(inside)).value, 0 not in at_ends).also(line)
 
     def _by_other_of_circle(self, index: int, line: Any) -> bool:
         """Whether the line is 0 at ±1 alone, where a sine or cosine has no value, as the other one is never 0."""
@@ -407,24 +393,6 @@ class Signs:
             return Sign(self.of(b).value * sign, difference.strict)
         return UNKNOWN
 
-    def _by_half_angle(self, p: fmpq_mpoly) -> Sign:
-        """Sine 2τ/(1 + τ²) and cosine (1 − τ²)/(1 + τ²); the angle π, where τ is infinite, separately."""
-        for sine, cosine in self.circles.items():
-            if cosine not in used(p):
-                continue
-            tau = self._ring.gens[self._half_angle(sine)]
-            terms = [(int(m[sine]), int(m[cosine]), m, c) for m, c in p.to_dict().items()]
-            degree = max(i + j for i, j, _, _ in terms)
-            total = self._ring.context.constant(0)
-            for i, j, monomial, coefficient in terms:
-                cofactor = [0 if index in (sine, cosine) else power for index, power in enumerate(monomial)]
-                factor = (2 * tau) ** i * (1 - tau**2) ** j * (1 + tau**2) ** (degree - i - j)
-                total += self._ring.context.from_dict({tuple(cofactor): coefficient}) * factor
-            at_pi = self.substituted(self.substituted(p, sine, self._constant(Fraction(0))), cosine, -self._ring.one)
-            if (sign := self.of(total).between(self.of(at_pi))).value:
-                return sign
-        return UNKNOWN
-
     def _by_square_of_a_sine(self, p: fmpq_mpoly) -> Sign:
         """Linear in g² with −1 ≤ g ≤ 1: between its values at g² = 0 and g² = 1."""
         for index in used(p):
@@ -432,12 +400,6 @@ class Signs:
             if parts.keys() == {0, 2} and (sign := self.of(parts[0]).between(self.of(parts[0] + parts[2]))).value:
                 return sign
         return UNKNOWN
-
-    def _half_angle(self, sine: int) -> int:
-        if sine not in self._half_angles:
-            tangent = Generator(f"tangent of half the angle of x{sine}", constant=False)
-            self._half_angles[sine] = self._ring.add(tangent)
-        return self._half_angles[sine]
 
     def _by_difference_from_facts(self, p: fmpq_mpoly) -> Sign:
         """p = q·fact + r with q and r of one sign."""
@@ -454,16 +416,6 @@ class Signs:
         """The sign of ``p`` by the rules that need no other sign."""
         signs = [rule(p) for rule in (self._by_facts, self._by_terms, self._by_forms)]
         return next((sign for sign in signs if sign.value), UNKNOWN)
-
-    def _by_squares(self, p: fmpq_mpoly) -> Sign:
-        """A generator g ≥ 0 replaced by R², where the ring has the root R of g."""
-        for root, square in list(self._ring.squares.items()):
-            (index, *others) = used(square) or {-1}
-            is_generator = not others and index in used(p) and square == self._ring.gens[index]
-            # a root in the ring need not be real
-            if is_generator and self._directly(square).value > 0:
-                return self.of(self.substituted(p, index, self._ring.gens[root] ** 2))
-        return UNKNOWN
 
     # --- combinations of products -----------------------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""Properties of an expression from its tree, without expansion: its sign, its rate, and the first integrals in it."""
+"""Properties of an expression from its tree, without expansion: its rate, and the first integrals in it."""
 
 from __future__ import annotations
 
@@ -7,9 +7,6 @@ from fractions import Fraction
 from typing import Any
 
 import sympy
-
-from heavytop.features.claims.algebra.elliptic import dn
-from heavytop.features.claims.algebra.signs import PLUS, UNKNOWN, Sign, sign_of_number, sum_of
 
 # Definitions as symbols with a meaning, so that a chain of them is not expanded, and their rates.
 
@@ -81,61 +78,6 @@ def at_values(expression: sympy.Expr, values: Mapping[sympy.Symbol, sympy.Expr])
         return e.subs(values, simultaneous=True) if e.free_symbols else e
 
     return substituted(expression)
-
-
-_BOUNDS = dict.fromkeys(("sin", "cos", "tanh", "sech", "sn", "cn"), Fraction(1)) | {"atan": Fraction(11, 7)}
-
-
-def sign_of(e: sympy.Expr) -> Sign:
-    """The sign of an expression where it is defined and real, from positive symbols, squares, roots, exponentials."""
-    if e.is_Rational:
-        return sign_of_number(e) if e else Sign(1, False)
-    if e.is_Symbol or e.is_NumberSymbol:
-        return PLUS if e.is_positive else UNKNOWN
-    if e.is_Mul:
-        total = PLUS
-        for part in e.args:
-            total = total.times(sign_of(part))
-        return total
-    if e.is_Add:
-        return _sign_of_sum(e)
-    if isinstance(e, (sympy.exp, sympy.cosh, sympy.sech, dn)):
-        return PLUS
-    if e.is_Pow and e.args[1].is_Rational:
-        return _sign_of_power(*e.args)
-    if isinstance(e, sympy.Abs):
-        return Sign(1, sign_of(e.args[0]).strict)
-    if isinstance(e, (sympy.tanh, sympy.sinh, sympy.atan, sympy.asin)):
-        return sign_of(e.args[0])
-    return Sign(1, False) if isinstance(e, sympy.acos) else UNKNOWN
-
-
-def _sign_of_power(base: sympy.Expr, exponent: sympy.Expr) -> Sign:
-    inside = sign_of(base)
-    strict = inside.strict or bool(exponent < 0)
-    if exponent.q % 2 == 0 or exponent.p % 2 == 0:
-        return Sign(1, strict)
-    return Sign(inside.value, strict) if exponent.q == 1 else UNKNOWN
-
-
-def _sign_of_sum(e: sympy.Expr) -> Sign:
-    """The sign of a sum with parts of one sign; bounds of bounded functions are subtracted from the constant part."""
-    constant, signs = Fraction(0), []
-    for part in e.args:
-        coefficient, factor = part.as_coeff_Mul()
-        bound = _BOUNDS.get(type(factor).__name__)
-        if part.is_Rational:
-            constant += Fraction(part)
-        elif coefficient.is_Rational and bound is not None and sign_of(part).value <= 0:
-            constant -= abs(Fraction(coefficient)) * bound
-        else:
-            signs.append(sign_of(part))
-    if constant:
-        signs.append(sign_of_number(constant))
-    elif not signs:
-        return UNKNOWN
-    # a negative constant part is only a lower bound
-    return sum_of(signs) if constant >= 0 else UNKNOWN
 
 
 class Names:

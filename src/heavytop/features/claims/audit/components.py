@@ -27,6 +27,7 @@ from heavytop.features.claims.algebra.conditions import (
     for_no_parameters,
     is_exactly_zero,
     reduced_everywhere,
+    sign_of,
     written,
 )
 from heavytop.features.claims.algebra.evaluate import evaluate
@@ -46,7 +47,7 @@ from heavytop.features.claims.algebra.statement import (
     Setting,
     Statement,
 )
-from heavytop.features.claims.algebra.structure import at_values, rate_along, rational_values, sign_of
+from heavytop.features.claims.algebra.structure import at_values, rate_along, rational_values
 from heavytop.features.claims.audit.context import (
     DOMAINS,
     STATE,

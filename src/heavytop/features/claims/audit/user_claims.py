@@ -99,9 +99,18 @@ class FileClaim(ABC):
         return judge(self.statements(about), self.setting, progress)
 
     def solves(self, about: System, rows: Sequence[StatementVerdict]) -> tuple[str, ...]:
-        """The systems that every equation is proven for; ``rows`` are those about ``about``."""
-        judged = {s.name: rows if s is about else judge(self.statements(s), self.setting) for s in self.context.systems}
-        return tuple(name for name, rows in judged.items() if verdict_of(rows) == "holds")
+        """The systems that the equations of motion, or all, are proven for; ``rows`` are those about ``about``."""
+
+        def judged(system: System) -> Sequence[StatementVerdict]:
+            if system is about:
+                return [row for row in rows if self.is_of_motion(row)]
+            return judge([s for s in self.statements(system) if self.is_of_motion(s)], self.setting)
+
+        return tuple(s.name for s in self.context.systems if verdict_of(judged(s)) == "holds")
+
+    def is_of_motion(self, row: StatementVerdict | Statement) -> bool:
+        """Whether a system whose motion the claim is must satisfy the equation."""
+        return True
 
     def about(self, requested: System | None) -> System:
         """The system requested, else the file's, else `heavy_gyrostat` where it gives k, else `heavy_top`.
@@ -204,20 +213,9 @@ class UserMotion(FileClaim):
             statements += numbered("3.2", motion.branch, motion.domain, identities, self.motion.angle_formulas)
         return statements
 
-    def solves(self, about: System, rows: Sequence[StatementVerdict]) -> tuple[str, ...]:
-        """The systems that (1.1), (1.2) and |γ| = 1 are proven for."""
-
-        def judged(system: System) -> Sequence[StatementVerdict]:
-            if system is about:
-                return [row for row in rows if _is_of_motion(row)]
-            return judge([s for s in self.statements(system) if _is_of_motion(s)], self.setting)
-
-        return tuple(s.name for s in self.context.systems if verdict_of(judged(s)) == "holds")
-
-
-def _is_of_motion(row: StatementVerdict | Statement) -> bool:
-    """(1.1), (1.2), and |γ|² = 1 of (1.3)."""
-    return row.equation in ("1.1", "1.2") or (row.equation, row.component) == ("1.3", 1)
+    def is_of_motion(self, row: StatementVerdict | Statement) -> bool:
+        """(1.1), (1.2), and |γ|² = 1 of (1.3)."""
+        return row.equation in ("1.1", "1.2") or (row.equation, row.component) == ("1.3", 1)
 
 
 def _with_constant_rotor(context: Context, clock: Clock) -> Context:
