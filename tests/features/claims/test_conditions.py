@@ -31,6 +31,7 @@ FREE = top("2 3 5", "0 0 1", weight="0")
         ("1 + 0*sqrt(-t)", "t>0", "-t ≥ 0"),
         ("1 + 0*asin(2 + t^2)", "all", "at every sample in the domain a formula is undefined"),
         ("(t + sqrt(t^2))/(t + sqrt(t^2))", "all", "t + sqrt(t^2) ≠ 0"),
+        ("sqrt(sinh(t)^2)/sinh(t)", "all", "sinh(t) ≠ 0"),
         ("t*(sqrt(3 + 2*sqrt(2)) - 1 - sqrt(2))/(sqrt(3 + 2*sqrt(2)) - 1 - sqrt(2)) - t + 1", "all", "≠ 0"),
     ],
 )
@@ -51,6 +52,9 @@ def test_a_formula_that_jumps_or_is_undefined_is_undecided_and_the_condition_is_
         ("sqrt(a^2)/a", "all", ["a > 0"]),
         ("1 + 0*sqrt(9 - a^2)", "all", ["a > 0", "a < 3"]),
         ("1 + 0*sqrt(5 - 4*cos(t)*sin(a*t))", "all", []),
+        # an exponential above 1, and a square that its expansion hides
+        ("sqrt(sinh(a)^2)/sinh(a)", "all", ["a > 0"]),
+        ("1 + 0*sqrt((5 - 3*sin(a)*sin(3*t) - 2*cos(t))^2)", "all", []),
         ("cos(atan(sinh(t)))*cosh(t)", "all", []),
         ("tanh(log(2 + t^2))*((2 + t^2)^2 + 1)/((2 + t^2)^2 - 1)", "all", []),
     ],

@@ -212,7 +212,7 @@ def sign_of(e: sympy.Expr) -> Sign:
     """The sign of an expression where it is defined and real, for all values of its symbols."""
     positive = tuple(symbol for symbol in e.free_symbols if symbol.is_positive)
     field = Field(Assumptions(sympy.Dummy("t", real=True), positive), [e])
-    return field.tower.sign(field.enter(e))
+    return field.sign(e)
 
 
 def conditions_for_zero(e: sympy.Expr) -> tuple[sympy.Expr, ...]:

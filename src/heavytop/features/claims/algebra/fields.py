@@ -30,7 +30,7 @@ from heavytop.features.claims.algebra.ring import (
     used,
     where_provable,
 )
-from heavytop.features.claims.algebra.signs import NUMBER_BITS, PLUS, UNKNOWN, Sign
+from heavytop.features.claims.algebra.signs import NUMBER_BITS, PLUS, UNKNOWN, Sign, sum_of
 from heavytop.features.claims.algebra.structure import Defined
 
 _MAX_EXPONENT = 64
@@ -246,6 +246,20 @@ class Field:
                 relation = prod(factors, start=self.tower.one) if constant else zero
             zeros.append(relation)
         return [relation for relation in zeros if relation]
+
+    @where_provable(UNKNOWN)
+    def sign(self, e: sympy.Expr) -> Sign:
+        """The sign of an expression where it is defined, part by part: its expansion hides squares."""
+        sign = sum_of(map(self._sign_of_product, sympy.Add.make_args(e)))
+        return sign if sign.value and sign.strict else sign.also(self.tower.sign(self.enter(e)))
+
+    def _sign_of_product(self, e: sympy.Expr) -> Sign:
+        sign, powers = PLUS, [factor.as_base_exp() for factor in sympy.Mul.make_args(e)]
+        for base, exponent in powers:
+            if exponent.is_even:
+                sign = sign.times(Sign(1, bool(exponent < 0) or self.sign(base).strict))
+        rest = sympy.Mul(*(base**exponent for base, exponent in powers if not exponent.is_even))
+        return sign.times(self.tower.sign(self.enter(rest)))
 
     def is_constant(self, value: Quotient) -> bool:
         """Whether the quotient has only generators that are constant in time."""

@@ -88,8 +88,9 @@ class Transcendental:
         def make(base: Quotient) -> int:
             meaning = sympy.exp(self._field.expression(base))
             index = self._new("exp", meaning, (base,), PLUS)
-            if sign := self._tower.sign(base).value:  # it lies above or below 1
-                excess = self._tower.add(Generator(f"excess over 1 of x{index}", constant=False, sign=1))
+            sign, strict = self._tower.sign(base)
+            if sign:  # it lies above or below 1
+                excess = self._tower.add(Generator(f"excess over 1 of x{index}", constant=False, sign=1, strict=strict))
                 self._tower.signs.declare_form(index, self._tower.gens[excess] + 1, below_one=sign < 0)
             return index
 

@@ -27,7 +27,7 @@ from heavytop.features.claims.algebra.conditions import (
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Field, Regularity
 from heavytop.features.claims.algebra.ring import Quotient, Unprovable, used, where_provable
-from heavytop.features.claims.algebra.signs import NUMBER_BITS, PLUS, sum_of, value_of
+from heavytop.features.claims.algebra.signs import NUMBER_BITS, PLUS, value_of
 from heavytop.features.claims.algebra.statement import Domain, Flow, Point, Setting, Statement
 from heavytop.precision import shown
 
@@ -144,6 +144,16 @@ class Region:
         divisor = next(region.divisors(forced=True), "")
         return divisor and f"its rate is divided by {divisor}, which may be 0 there"
 
+    def _is_excluded(self, p: fmpq_mpoly) -> bool:
+        """A need of the claim as written has the factor p, so p is not 0, and p keeps its sign."""
+        for need in self._statement.formulas.needs:
+            if need.kind is not ConditionKind.NONNEGATIVE:
+                with suppress(Unprovable):
+                    value = self.field.enter(need.expression)
+                    if value.denominator == self.field.tower.one and not divmod(value.numerator, p)[1]:
+                        return self.is_kept(p)
+        return False
+
     @_answered_once
     def is_zero_nowhere_dense(self, p: fmpq_mpoly) -> bool:
         """0 on a set without interior at most."""
@@ -240,12 +250,9 @@ class Region:
     def _discharge(self, need: Need) -> str:
         # a quotient is 0 only where its numerator is
         e = sympy.numer(need.expression) if need.kind is ConditionKind.NONZERO else need.expression
-        # as a sum of squares, which its expansion hides
-        if need.kind.is_met_by(
-            sum_of(self.field.tower.sign(self.field.enter(part)) for part in sympy.Add.make_args(e))
-        ):
+        if need.kind.is_met_by(self.field.sign(e)):
             return _EVERYWHERE
-        value = self.field.enter(e)
+        value = self.field.enter(need.expression)
         factors = self._factors(value.numerator) if need.kind is ConditionKind.NONZERO and value.numerator else []
         is_nonzero = bool(factors) and all(map(self._is_never_zero, factors))
         if is_nonzero or need.kind.is_met_by(self.field.tower.sign(value)):
@@ -347,7 +354,9 @@ class Region:
         for text, p in list(self.field.tower.divisors.items()):
             if (forced, text) not in self._divisors:
                 self._divisors[forced, text] = (
-                    all(map(self._is_never_zero, self._factors(p))) if forced else self.is_zero_nowhere_dense(p)
+                    all(self._is_never_zero(factor) or self._is_excluded(factor) for factor in self._factors(p))
+                    if forced
+                    else self.is_zero_nowhere_dense(p)
                 )
             if not self._divisors[forced, text]:
                 try:
