@@ -93,7 +93,7 @@ def test_principal_axes_diagonalize_exactly_but_for_what_is_left() -> None:
         assert max(abs(x) for row in found.left for x in row) <= largest / 2**190
 
 
-@pytest.mark.parametrize("moments", [(3, 2, 1), (3, 3, 1), (1, 4, 4)])
+@pytest.mark.parametrize("moments", [(3, 2, 1), (3, 3, 1), (1, 4, 4), (3 + Fraction(1, 10**90), 2, 1)])
 def test_rational_principal_axes_are_found_exactly(moments: Any) -> None:
     rows = Attitude.quaternion(1, 2, -3, 5, normalize=True).exact_rows()
     diagonal = [[Fraction(moments[i] * (i == j)) for j in range(3)] for i in range(3)]

@@ -85,7 +85,7 @@ def principal_axes(tensor: Rows[Fraction], bits: int) -> PrincipalAxes:
     bits += _spread(tensor)
     near = _near(tensor, bits)
     turned = multiplied(transposed(near), multiplied(tensor, near))
-    moments = [_exact_moment(tensor, round_to(turned[i][i], bits + _GUARD_BITS)) for i in range(3)]
+    moments = [_exact_moment(tensor, turned[i][i], bits + _GUARD_BITS) for i in range(3)]
     is_exact = not any(determinant(_less(tensor, [moment] * 3)) for moment in moments)
     vectors = _unit_vectors(tensor, moments) if is_exact else None
     return _with_remainder(tensor, near, moments) if vectors is None else _with_remainder(tensor, _along(vectors, near))
@@ -122,11 +122,11 @@ def _less(tensor: Rows[Fraction], moments: Sequence[Fraction]) -> Three[Vector]:
     return (a - moments[0], b, c), (d, e - moments[1], f), (g, h, i - moments[2])
 
 
-def _exact_moment(tensor: Rows[Fraction], near: Fraction) -> Fraction:
-    """The rational moment in place of the number near it: over the common denominator it is an integer."""
+def _exact_moment(tensor: Rows[Fraction], near: Fraction, bits: int) -> Fraction:
+    """The rational moment near a number: over the common denominator it is an integer; else the number rounded."""
     common = lcm(*(value.denominator for row in tensor for value in row))
     candidate = Fraction(round(near * common), common)
-    return near if determinant(_less(tensor, [candidate] * 3)) else candidate
+    return round_to(near, bits) if determinant(_less(tensor, [candidate] * 3)) else candidate
 
 
 def _along(vectors: Sequence[Vector], near: Rows[Fraction]) -> Three[Vector]:
