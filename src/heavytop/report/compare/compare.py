@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
@@ -21,7 +22,7 @@ from heavytop.report.compare.rows import Finding, RowComparison
 from heavytop.report.compare.verdicts import Verdict
 from heavytop.report.document.kind import Kinds, kind_of
 from heavytop.report.document.motions import WorseMotions
-from heavytop.report.store.store import AnyReport, Brief, BriefRows
+from heavytop.report.store.store import UNREADABLE, AnyReport, Brief, BriefRows
 
 __all__ = ["Differences", "Finding", "compare"]
 
@@ -227,7 +228,12 @@ def _by_halves(baseline: BriefRows, candidate: BriefRows, new_part: Callable[[],
     and where a row is repeated or invalid in the second half: then the order of all rows matters.
     """
     half = len(baseline) // 2
-    if len(baseline) != len(candidate) or half < _MANY or not baseline[half].has_identity_of(candidate[half]):
+    if len(baseline) != len(candidate) or half < _MANY:
+        return None
+    aligned = False
+    with suppress(*UNREADABLE):
+        aligned = baseline[half].has_identity_of(candidate[half])
+    if not aligned:
         return None
 
     def compared(places: slice) -> tuple[_Part, set[int], set[int]]:

@@ -30,7 +30,7 @@ from heavytop.version import commit
 
 FILE = "report.json"
 DIGEST = "report.json.sha256"
-_UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 _NAME = 200
 _SECONDS = b'"seconds":'
 _decode_seconds = msgspec.json.Decoder(dict[str, Seconds]).decode
@@ -114,7 +114,7 @@ class BriefRows:
             return None
         if new == old:
             return twin
-        with suppress(*_UNREADABLE):
+        with suppress(*UNREADABLE):
             if _decode_seconds(old) == twin.seconds:
                 return replace_struct(twin, seconds=_decode_seconds(new))
         return None
@@ -135,7 +135,7 @@ class BriefRows:
             rows: list[Row] = []
             try:
                 rows.extend(twins.get(number) or self._decode(self._rows[number]) for number in numbers)
-            except _UNREADABLE as error:
+            except UNREADABLE as error:
                 where = f"row {start + len(rows) + 1}: {error}"
                 raise InputError(f"{self._file} is not a whole report: {where}.", REMEDY) from None
             check_rows(self._file, [row for n, row in zip(numbers, rows, strict=True) if n not in twins], self._kinds)
@@ -211,10 +211,10 @@ def _read(path: Path, kind: type[_Content]) -> tuple[Path, _Content]:
     try:
         report = msgspec.json.decode(content, type=kind)
         problem = ""
-    except _UNREADABLE as error:
+    except UNREADABLE as error:
         problem = str(error)
     if problem or report.schema != SCHEMA:
-        with suppress(*_UNREADABLE):
+        with suppress(*UNREADABLE):
             schema = msgspec.json.decode(content, type=_Schema).schema
             if schema != SCHEMA:
                 raise InputError(f"{file} has the schema {schema[:60]!r}, not {SCHEMA!r}.", REMEDY)
@@ -236,7 +236,7 @@ def _check_repeats(file: Path, content: bytes) -> None:
         json.loads(content, object_pairs_hook=without_repeats)
     except InputError as error:
         raise InputError(f"{file}: {error.cause}", REMEDY) from None
-    except _UNREADABLE as error:
+    except UNREADABLE as error:
         raise InputError(f"{file} is not a whole report: {error}.", REMEDY) from None
 
 
