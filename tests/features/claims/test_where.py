@@ -43,6 +43,7 @@ TRUE = [
     ("lagrange", "Omega3", (AREA.replace("4", "2"),), "integral"),
     ("lagrange", "log(-Omega3 - 8)", (), "integral"),
     ("lagrange", "1/Omega3", ("Omega1", "Omega2", "gamma1", "gamma2"), "integral"),
+    ("lagrange", "gamma1^2/sqrt(1 + gamma1^2 + gamma2^2)^2 + (1 + gamma2^2)/(2 - gamma3^2)", (), "integral"),
     ("free", "Omega3", ("Omega1^2 + Omega2^2",), "integral"),
     ("free", "sqrt(4*Omega1^2 + 9*Omega2^2 + 25*Omega3^2) - 2", (), "relation"),
     ("free", "Omega1 - sqrt(5)*Omega3", (), "relation"),

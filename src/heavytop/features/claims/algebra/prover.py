@@ -96,9 +96,10 @@ class Region:
 
     @where_provable(False)
     def vanishes(self, expression: sympy.Expr) -> bool:
-        """0 by the algebra, and by relations between inverse functions."""
+        """0 by the algebra, by relations between inverse functions, or as a multiple of what is 0 at every state."""
         p = self.field.enter(expression).numerator
-        return not (p and self._arcs.without(p))
+        zeros = (self.field.enter(zero).numerator for zero in self._always)
+        return not (p and self._arcs.without(p)) or any(not divmod(p, zero)[1] for zero in zeros)
 
     def is_forced(self, expression: sympy.Expr, *, radical: bool) -> bool:
         """0 by the relations of the claim, as in :meth:`~heavytop.features.claims.algebra.fields.Field.is_forced`."""
