@@ -208,14 +208,21 @@ class GuardedProcess:
 def forked(work: Callable[[], T]) -> Iterator[Callable[[], T | None] | None]:
     """Calls ``work`` in a copy of this process, which ends with the block, or with its work where this process is
     killed; the function waits for the result, which is None where ``work`` raises.  None in place of the function on
-    other systems than Linux.  Other threads must hold no lock that ``work`` needs.
+    other systems than Linux, and where there is no process to be had.  Other threads must hold no lock that ``work``
+    needs.
     """
     if sys.platform != "linux":
         yield None
         return
     readable, writable = os.pipe()
-    with warnings.catch_warnings(action="ignore", category=DeprecationWarning):  # of idle threads of libraries
-        child = os.fork()
+    try:
+        with warnings.catch_warnings(action="ignore", category=DeprecationWarning):  # of idle threads of libraries
+            child = os.fork()
+    except OSError:
+        os.close(readable)
+        os.close(writable)
+        yield None
+        return
     if not child:
         gc.disable()
         with suppress(BaseException), open(writable, "wb") as pipe:

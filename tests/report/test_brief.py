@@ -210,3 +210,12 @@ def test_a_copied_process_gives_its_result_or_none_and_ends() -> None:
     with forked(lambda: sleep(1000)):
         assert children.read_text() != before
     assert children.read_text() == before
+
+
+def test_no_process_to_be_had_is_no_copy(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails() -> int:
+        raise BlockingIOError
+
+    monkeypatch.setattr(os, "fork", fails)
+    with forked(int) as answer:
+        assert answer is None

@@ -154,7 +154,7 @@ def double_peer(
     if control not in ("tolerance", "step"):
         raise refusal("control", '"tolerance" or "step"', quoted(control), "Give one of these.")
     if as_integer(order, "order") < 0:
-        raise refusal("order", "0 or more", order, "Give 0 where there is none to declare.")
+        raise refusal("order", "0 or more", order, "Give 0 for a method without an order.")
     name, control = str(text(name, "name")), str(control)
     if not name or said(name) != name:
         raise refusal("name", "1 to 200 printable characters", quoted(name), "Give such a name.")
