@@ -838,6 +838,8 @@ def _prim(name: str, values: Mapping[str, str], units: Mapping[str, str]) -> Bod
     size = -EARTH[2] if magnitude.startswith("-") else numbers.number(magnitude, "gravityMagnitude") * length
     down = numbers.three(values.get("gravityDirection"), "gravityDirection", "0 0 0")
     if not any(down):
+        if units["upAxis"] not in ("X", "Y", "Z"):
+            raise refusal("upAxis", "X, Y or Z", quoted(units["upAxis"]), "Give the axis that points up.")
         down = vector([-int(axis == units["upAxis"]) for axis in "XYZ"], "upAxis")
     gx, gy, gz = ((0 if free else size) * component for component in _unit(down))
     return BodyInFile(name, mass, (x, y, z), (a, b, c, d, e, f), slack * scale, gravity=(gx, gy, gz))

@@ -517,6 +517,7 @@ REFUSED = {
     "global": (in_mjcf(BALL, '<compiler coordinate="global"/>'), "MuJoCo 2.3.3"),
     "fused": (in_mjcf(BALL, '<compiler fusestatic="true"/>'), "fusestatic"),
     "y up in USD": (("usda", in_usd("9.81", "")[1].replace("(", '(\n upAxis = "Y"', 1)), "along -z; got 0, -0.0981, 0"),
+    "w up in USD": (("usda", in_usd("9.81", "")[1].replace("(", '(\n upAxis = "W"', 1)), "X, Y or Z; got 'W'"),
     "x down in USD": (in_usd("1\n physics:gravityDirection = (2, 0, 0)", ""), "along -z; got 0.01, 0, 0"),
     "gravity along y": (in_mjcf(BALL, '<option gravity="0 -9.81 0"/>'), "--gravity"),
     "no boolean": (in_sdf('degrees="yes"'), "degrees must be true or false; got 'yes'"),
