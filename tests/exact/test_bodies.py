@@ -283,7 +283,7 @@ def test_a_tensor_that_is_none_about_the_centre_of_mass_is_a_warning(inertia, ab
         return
     (text,) = found
     assert f"about the centre of mass, of principal moments {diagonal}, is not a rigid body's" in text
-    assert ("The tensor is about the centre of mass, and was read as about the pivot." in text) == (about == "pivot")
+    assert ("by a tensor about the centre of mass that was read as about the pivot." in text) == (about == "pivot")
 
 
 def test_what_may_be_0_is_printed_as_0_with_its_radius() -> None:

@@ -268,6 +268,8 @@ class Body:
         """
         from heavytop.top.body_files import read_body
 
+        if not isinstance(path, (str, Path)):
+            raise refusal("path", "a path", quoted(path), "Give text or a pathlib.Path.")
         link_or_body = read_body(Path(path), link)
         body = link_or_body.about(None if pivot is None else vector(pivot, "pivot"))
         gravity = link_or_body.gravity_down if gravity is None else gravity

@@ -31,6 +31,7 @@ _UTF8_MARK = b"\xef\xbb\xbf"
 _LARGEST_FILE = 50_000_000
 _LARGEST = Fraction(10**30)
 _MOST_SLACK = Fraction(1, 200)
+_COMPARABLE = Fraction(1, 1000)
 _FROM_DOUBLE = Fraction(1, 10**14)
 _ZERO: Vector = (Fraction(0), Fraction(0), Fraction(0))
 EARTH: Vector = (Fraction(0), Fraction(0), Fraction("-9.81"))
@@ -47,7 +48,8 @@ class BodyInFile:
     slack: rounding of the printed digits, of an entry of the second moments.
     geometry, geometry_axes: tensor about its centre of the one shape that the file gives it, uniform and of 1 kg, and
     the rotation of its axes; None where it gives none, several, or a mesh.
-    joint: where a ball joint holds it, or None.  gravity: in the axes of the world.
+    joint: where a ball joint holds it, or None.  gravity: in the axes of the world.  note: what the file leaves out, or
+    is not read of it, as a sentence.
     """
 
     name: str
@@ -61,6 +63,7 @@ class BodyInFile:
     gravity: Vector = EARTH
     at_pivot: bool = False
     si: bool = True
+    note: str = ""
 
     @property
     def gravity_down(self) -> Fraction:
@@ -100,9 +103,10 @@ def read_body(path: Path, link: str | None = None) -> BodyInFile:
     if body.mass <= 0:
         raise refusal(f"{body.name}: mass", "positive", body.mass, "Give its mass in kg.")
     largest = max(map(abs, body.six))
-    extremes = max(body.mass, largest, *map(abs, body.centre)), min(body.mass, largest or body.mass)
-    if extremes[0] > _LARGEST or extremes[1] < 1 / _LARGEST:
-        raise InputError(f"{body.name}: mass, centre and moments must be of 1e-30 to 1e30.", "Give them in kg and m.")
+    farthest = max(map(abs, (Fraction(1), *body.centre)))
+    for key, size in (("mass", body.mass), ("inertia", largest or body.mass), ("centre", farthest)):
+        if not 1 / _LARGEST <= size <= _LARGEST:
+            raise refusal(f"{body.name}: {key}", "of 1e-30 to 1e30", six_digits(size), "Give it in kg and m.")
     return body
 
 
@@ -199,17 +203,17 @@ def _of_links(root: Element, reader: Callable[[str, Element, Element, _Around], 
 
 
 class _Numbers:
-    """Numbers of one element of a file, with the unit in the last digit of each decimal."""
+    """Numbers of one element of a file; of each decimal its size and the unit in its last digit."""
 
-    def __init__(self, where: str) -> None:
-        self.where = where
-        self.units: list[Fraction] = []
+    def __init__(self, where: str, if_missing: str = "Give it in the file.") -> None:
+        self.where, self.if_missing = where, if_missing
+        self.units: list[tuple[Fraction, Fraction]] = []
 
     def read(self, text: str | None, what: str, default: str | None = None) -> list[Fraction]:
         """The numbers of ``text``, separated by spaces or commas."""
         text = text if text is not None else default
         if text is None:
-            raise InputError(f"{self.where}: {what} is missing.", "Give it in the file.")
+            raise InputError(f"{self.where}: {what} is missing.", self.if_missing)
         if "${" in text or "$(" in text:
             raise InputError(
                 f"{self.where}: {what} = {quoted(text)} is an expression of xacro.",
@@ -223,7 +227,7 @@ class _Numbers:
         _, _, decimals = text.lower().partition("e")[0].partition(".")
         exponent = int(text.lower().partition("e")[2] or 0)
         if decimals or exponent < 0:
-            self.units.append(Fraction(10) ** (exponent - len(decimals)))
+            self.units.append((abs(value), Fraction(10) ** (exponent - len(decimals))))
         return value
 
     def three(self, text: str | None, what: str, default: str | None = None) -> Vector:
@@ -281,7 +285,8 @@ class _Numbers:
     ) -> tuple[Six, Fraction]:
         """Six numbers, and the slack of their printed digits: an entry of ½ tr J − J collects four halves of a unit.
 
-        Zeros at the end may have been left out, so that the finest number says the unit; at most a part of the largest.
+        Zeros at the end may have been left out, so that the finest number says the unit, but none that is far smaller
+        than the largest; at most a part of that.
         products: what the format takes for a product of inertia that is not there.
         """
         self.units = []
@@ -289,7 +294,9 @@ class _Numbers:
             self.some(text, name, 1, None if index < 3 else products)[0]
             for index, (text, name) in enumerate(zip(texts, what, strict=True))
         )
-        return (a, b, c, d, e, f), min(2 * min(self.units, default=Fraction(0)), _MOST_SLACK * max(map(abs, (a, b, c))))
+        largest = max(map(abs, (a, b, c)))
+        units = [unit for size, unit in self.units if not size or size >= _COMPARABLE * largest]
+        return (a, b, c, d, e, f), min(2 * min(units, default=Fraction(0)), _MOST_SLACK * largest)
 
 
 def _rpy(numbers: _Numbers, text: str | None, degrees: bool = False) -> Tensor:
@@ -330,7 +337,25 @@ def _urdf(name: str, link: Element, inertial: Element, around: _Around) -> BodyI
     of_gazebo = [child for child, outer in around.items() if outer.tag == "gazebo" and outer.get("reference") == name]
     switches = [child for child in of_gazebo if child.tag in ("gravity", "turnGravityOff")]
     falls = all(numbers.flag(child.text, child.tag) == (child.tag == "gravity") for child in switches)
-    return BodyInFile(name, value, centre, _in_axes(axes, six), slack, *shape, gravity=EARTH if falls else _ZERO)
+    six, note = _in_axes(axes, six), _attached([*around], name)
+    return BodyInFile(name, value, centre, six, slack, *shape, gravity=EARTH if falls else _ZERO, note=note)
+
+
+def _attached(elements: Sequence[Element], name: str) -> str:
+    """The note on links with a mass that fixed joints attach to a link, directly or one after the other."""
+    links = {link.get("name", "") for link in elements if link.tag == "link" and link.find("inertial") is not None}
+    joints = [
+        [*joint.iterfind("parent"), *joint.iterfind("child")] for joint in elements if joint.get("type") == "fixed"
+    ]
+    pairs = [[end.get("link") or end.text for end in ends] for ends in joints if len(ends) == 2]
+    held: list[str | None] = [name]
+    for parent in held:
+        held += {child for above, child in pairs if above == parent} - {*held}
+    return _not_included(len(links & {*held[1:]}))
+
+
+def _not_included(count: int) -> str:
+    return f"Attached without a joint that moves, and not included: {plural(count, 'body', 'bodies')}." if count else ""
 
 
 def _origin(numbers: _Numbers, element: Element) -> Pose:
@@ -394,7 +419,8 @@ _SDF_INERTIAL = ("mass", "pose", "inertia", "density", "auto_inertia_params")
 
 
 def _sdf(name: str, link: Element, inertial: Element, around: _Around) -> BodyInFile:
-    numbers, pose, tensor = _Numbers(f"link {name}"), inertial.find("pose"), inertial.find("inertia")
+    numbers = _Numbers(f"link {name}", "Give it in the file, also where 1 is meant, the default of SDF.")
+    pose, tensor = inertial.find("pose"), inertial.find("inertia")
     if inertial.find("fluid_added_mass") is not None:
         raise InputError(f"{numbers.where}: fluid_added_mass is not supported.", "Leave it out.")
     numbers.require_once(link, "inertial", "gravity")
@@ -413,7 +439,8 @@ def _sdf(name: str, link: Element, inertial: Element, around: _Around) -> BodyIn
     six, slack = numbers.tensor(texts, _SIX_URDF, products="0")
     mass, frames = numbers.number(inertial.findtext("mass"), "mass"), _SdfFrames(numbers, link, around)
     shape = _shape_of(_shapes(numbers, link, frames.in_link), centre)
-    return BodyInFile(name, mass, centre, _in_axes(axes, six), slack, *shape, frames.ball(), frames.gravity())
+    six, note = _in_axes(axes, six), _attached([*around], link.get("name", ""))
+    return BodyInFile(name, mass, centre, six, slack, *shape, frames.ball(), frames.gravity(), note=note)
 
 
 @dataclass(frozen=True, slots=True)
@@ -596,7 +623,15 @@ def _mjcf_body(name: str, body: Element, parts: _Parts, frames: _MjcfFrames) -> 
     joint = frames.pose(numbers, *balls[0])[1] if balls else None
     shape = _shape_of(frames.shapes(numbers, parts), centre)
     x, y, z = ((1 - numbers.number(body.get("gravcomp"), "gravcomp", "0")) * value for value in frames.gravity)
-    return BodyInFile(name, mass, centre, _in_axes(axes, six), slack, *shape, joint, (x, y, z))
+    note = _not_included(_welded(parts))
+    return BodyInFile(name, mass, centre, _in_axes(axes, six), slack, *shape, joint, (x, y, z), note=note)
+
+
+def _welded(parts: _Parts) -> int:
+    """The number of bodies with a mass within a body of MJCF, and within these, that have no joint."""
+    inner = [[*_parts(child)] for child, _ in parts if child.tag == "body"]
+    tags = [({part.tag for part, _ in parts}, parts) for parts in inner]
+    return sum(bool(own & {"inertial", "geom"}) + _welded(of) for own, of in tags if not own & {"joint", "freejoint"})
 
 
 def _compiled(path: Path) -> Any:
@@ -924,15 +959,16 @@ def _toml_table(name: str, table: Mapping[str, Any]) -> BodyInFile:
     six, slack = numbers.tensor(texts, ("I11", "I22", "I33", "I12", "I13", "I23"))
     centre = numbers.three(" ".join(_texts(table.get("centre", ["0", "0", "0"]))), "centre")
     mass = numbers.number(str(table["mass"]), "mass")
-    if table.get("about") not in ("pivot", "centre of mass") and (any(centre) or "about" in table):
-        raise InputError(
-            f"{numbers.where}: the reference point of the inertia tensor (about) is missing.",
-            'Give about = "pivot" or about = "centre of mass".',
-        )
+    if (about := table.get("about")) not in ("pivot", "centre of mass") and (any(centre) or "about" in table):
+        what, got = "about, the reference point of the inertia tensor,", "nothing" if about is None else quoted(about)
+        raise refusal(f"{numbers.where}: {what}", '"pivot" or "centre of mass"', got, "Give one of these.")
     if table.get("rotor"):
         raise InputError(f"{numbers.where}: a rotor in a file is not supported.", "Describe the whole body.")
-    gravity = (Fraction(0), Fraction(0), -numbers.number(str(table.get("gravity", "9.81")), "gravity"))
-    return BodyInFile(name, mass, centre, six, slack, gravity=gravity, at_pivot=table.get("about") == "pivot", si=False)
+    if (size := numbers.number(str(table.get("gravity", "9.81")), "gravity")) < 0:
+        raise refusal(f"{numbers.where}: gravity", "0 or positive", six_digits(size), "Give its size, such as 9.81.")
+    note = "" if "centre" in table else "The file has no centre: the centre of mass is taken to be the pivot."
+    extra: dict[str, Any] = {"gravity": (Fraction(0), Fraction(0), -size), "at_pivot": about == "pivot", "note": note}
+    return BodyInFile(name, mass, centre, six, slack, si=False, **extra)
 
 
 def _texts(values: Any) -> list[str]:

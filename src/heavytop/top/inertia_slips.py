@@ -170,8 +170,9 @@ def mending(body: MassProperties) -> str:
 
 def realisable(central: Tensor, slack: Fraction = Fraction(0)) -> bool:
     """Whether a body has this tensor about its centre of mass: positive moments, triangle inequality."""
-    # a moment within rounding of 0 or negative: all mass is on a line, or missing
-    floor = max(slack, _SMALL * max(map(abs, six_of(central))))
+    six = six_of(central)
+    # a moment that is 0 but for roundings in double, of which a diagonal tensor has none: all mass is on a line
+    floor = _ROUNDINGS * max(map(abs, six)) if any(six[3:]) else Fraction(0)
     return has_second_moments(central, slack) and is_positive(central) and _semidefinite(central, -floor)
 
 
@@ -226,17 +227,19 @@ def _mends(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
     sentence = "The products of inertia have the opposite sign: I12 is minus the integral of x y dm."
     if flipped != n:
         yield _mend(body, "signs_of_products", sentence, flipped)
-    if not body.at_pivot and any(body.centre):
-        sentence = "The tensor was already about the centre of mass when the Steiner term was subtracted."
+    # nearly every tensor beyond the triangle inequality is mended by Steiner's term; hardly one with a negative moment
+    if not body.at_pivot and any(body.centre) and not (body.geometry is None and is_positive(body.central)):
+        sentence = "It would be explained by a Steiner term that was subtracted from a tensor about the centre of mass."
         yield _mend(body, "about_centre", sentence, six_of(plus(rows(n), steiner(body.mass, body.centre))))
     if negative := sum(value < 0 for value in n[:3]):
         cause = "A moment of inertia is negative: its sign is" if negative == 1 else "Signs of moments of inertia are"
         yield _mend(body, "negative_moment", f"{cause} wrong.", (abs(n[0]), abs(n[1]), abs(n[2]), *n[3:]))
     if body.at_pivot:
-        slip = Slip("about_centre", "The tensor is about the centre of mass, and was read as about the pivot.", n)
+        sentence = "It would be explained by a tensor about the centre of mass that was read as about the pivot."
+        slip = Slip("about_centre", sentence, n)
         yield slip, replace(body, at_pivot=False)
         centre = _metres(body.centre)
-        sentence = "The centre of mass is in millimetres, and the tensor in metres."
+        sentence = "It would be explained by a centre of mass in millimetres beside a tensor in metres."
         yield Slip("millimetres", sentence, n, centre=centre), replace(body, centre=centre)
 
 

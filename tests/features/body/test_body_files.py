@@ -149,6 +149,7 @@ def test_a_tensor_multiplied_in_double_is_read_by_its_upper_entries(tmp_path: Pa
             "unstable unstable stable",
             "unstable: a component ε of Ω along the axis of symmetry makes it drift away linearly, by 0.5 ε t",
         ),
+        ("0.0833333 0.0833334 1e-9", "unstable unstable stable", "unstable"),  # a rod, beyond the triangle by rounding
     ],
 )
 def test_free_rotations_are_said_to_be_stable_or_not(tmp_path: Path, moments: str, verdicts: str, said: str) -> None:
@@ -211,6 +212,15 @@ def test_several_links_want_a_name(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace('"2.5"', '"${m}"', 1))
     assert heavytop("body", path, "--link", "hand").returncode == 0, "a fault of another link is no fault of this one"
     assert heavytop("body", path, "--link", "arm").returncode == 2
+    chain = "".join(
+        f'<link name="{b}">{INERTIAL}</link><joint type="fixed"><parent link="{a}"/><child link="{b}"/></joint>'
+        for a, b in (("leg", "b"), ("b", "c"))
+    )
+    welded = f'<body>{BALL}<frame><body name="d">{BALL}<body>{BALL}<joint/></body></body></frame></body>'
+    for (suffix, text), link in ((leg("</robot>", f"{chain}</robot>"), "leg"), (in_mjcf(BALL + welded), "arm")):
+        (path := tmp_path / f"chain.{suffix}").write_text(text)
+        note = json.loads(heavytop("body", path, "--link", link, "--json").stdout)["note"]
+        assert note.endswith("not included: 2 bodies.")
     model = sdf(SIX)[19:-6]
     other = model.replace('name="m"', 'name="n"')
     (world := tmp_path / "world.sdf").write_text(f"<sdf><world>{model}{other}</world></sdf>")
@@ -293,6 +303,7 @@ TWICE = (0.075 - 0.18, 0.37 / 6 - 0.18, 1 / 60)
     [
         (TWICE, SHAPE, ["about_centre"]),
         (TWICE, "", ["about_centre", "negative_moment"]),
+        ([0.2, 0.5, 0.71], "", []),  # of which any moment may be wrong
         ([2 * TWICE[0] / 3, 2 * TWICE[1] / 3, 0.02], SHAPE, ["about_centre"]),
         ([1e4 * value for value in UNIFORM], SHAPE, ["centimetres"]),
         ([1e4 * value for value in UNIFORM], "", ["centimetres", "grams"]),
@@ -480,6 +491,9 @@ REFUSED = {
     "auto": (("sdf", sdf(SIX).replace("<inertial>", '<inertial auto="true">')), "expand-auto-inertials"),
     "not symmetric": (("toml", "mass = 1\ninertia = [[1, 2, 0], [0, 1, 0], [0, 0, 1]]"), "symmetric"),
     "no word on the point": (("toml", "mass = 1\ncentre = [1, 0, 0]\ninertia = [1, 1, 1]"), "about"),
+    "another point": (("toml", 'mass = 1\ninertia = [1, 1, 1]\nabout = "com"'), "\"centre of mass\"; got 'com'"),
+    "gravity downwards": (("toml", "mass = 1\ngravity = -9.81\ninertia = [1, 1, 1]"), "got -9.81.\n  Give its size"),
+    "a default of SDF": (("sdf", sdf(SIX).replace("<mass>2.5</mass>", "")), "where 1 is meant"),
     "a tensor of zeros": (
         ("usda", '#usda 1.0\ndef "a" {\n physics:mass = 1\n physics:diagonalInertia = (0, 0, 0)\n}'),
         "in numbers",

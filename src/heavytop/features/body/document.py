@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from fractions import Fraction
 from typing import Any
 
-from heavytop.precision import Vector, decimal_text
+from heavytop.precision import Vector, decimal_text, distinct_digits
 from heavytop.report.render.text import wrapped
 from heavytop.top.bodies import CENTRE, PrincipalAxes, magnitude_of_gravity, principal_axes
 from heavytop.top.body_files import BodyInFile
@@ -29,6 +29,7 @@ class BodyAssessment:
 
     name: of the link.  given: its mass properties about the pivot.  realisable: whether a body has them.
     slips: of which one makes it a body, or explains what is implausible.  gravity: text, of the table for a plan.
+    note: what the file leaves out, or is not read of it.
     """
 
     name: str
@@ -36,6 +37,7 @@ class BodyAssessment:
     realisable: bool
     slips: tuple[Slip, ...]
     gravity: str
+    note: str
 
     @property
     def principal(self) -> PrincipalAxes:
@@ -98,6 +100,7 @@ class BodyAssessment:
             "slips": [
                 {"name": slip.name, "sentence": slip.sentence, "inertia": _mended(slip.inertia)} for slip in self.slips
             ],
+            "note": self.note,
             "rotations": [asdict(rotation) for rotation in self.rotations] if self.realisable else [],
             "toml": self.toml,
         }
@@ -116,6 +119,7 @@ class BodyAssessment:
             yield from wrapped(f"{slip.name}: {slip.sentence}", "    ", "  ")
             for numbers in _corrected(slip, self.given):
                 yield from wrapped(f"corrected: {numbers}", " " * 6, "    ")
+        yield from wrapped(self.note)
         yield ""
         yield f"mass                {_decimal(self.given.mass)}"
         yield from _labelled("centre of mass", f"{', '.join(map(_decimal, self.given.centre))}   from the pivot")
@@ -152,18 +156,17 @@ def assess(body: BodyInFile, pivot: Vector | None = None, gravity: str | None = 
         gravity = _decimal(body.gravity_down)
     else:
         magnitude_of_gravity(gravity)
-    return BodyAssessment(
-        body.name, about_pivot, realisable(about_pivot.central, about_pivot.slack), tuple(slips(about_pivot)), gravity
-    )
+    possible = realisable(about_pivot.central, about_pivot.slack)
+    return BodyAssessment(body.name, about_pivot, possible, tuple(slips(about_pivot)), gravity, body.note)
 
 
 def _reason(moments: Vector) -> str:
     """Which condition the principal moments break."""
     low, middle, high = sorted(moments)
-    if low <= 0:
-        return f"its smallest principal moment is {decimal_text(low, _PRINTED)}, and must be positive."
-    total = decimal_text(low + middle, _PRINTED)
-    return f"its largest principal moment, {decimal_text(high, _PRINTED)}, exceeds the sum of the others, {total}."
+    if low <= 0 or high <= low + middle:
+        return f"its smallest principal moment is {decimal_text(low, _PRINTED)}, and must be positive beyond rounding."
+    largest, total = distinct_digits(high, low + middle)
+    return f"its largest principal moment, {largest}, exceeds the sum of the others, {total}."
 
 
 def _decimal(value: Fraction) -> str:
@@ -179,6 +182,8 @@ def _corrected(slip: Slip, given: MassProperties) -> Iterator[str]:
         yield ", ".join(f"{name} = {_decimal(value)}" for name, value in pairs if value is not None)
     elif slip.inertia != given.six:
         yield f"inertia = {json.dumps(_mended(slip.inertia))}"
+    elif slip.name == "about_centre":
+        yield f'about = "{CENTRE}"'
     if slip.mass is not None:
         yield f"mass = {json.dumps(_decimal(slip.mass))}"
     if slip.centre is not None:
