@@ -119,6 +119,7 @@ _NAMES = (
     "claim_evaluation",
     "local_error_ulp",
     "break_away_slope",
+    "observed_order",
     "error",
 )
 

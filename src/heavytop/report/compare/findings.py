@@ -56,6 +56,8 @@ _WORDS = {
     "local_error_ulp": "error of a step in eps",
     "break_away_time": "escape time",
     "drift": "drift",
+    "seconds run": "seconds",
+    "seconds least": "seconds of the fastest run",
 }
 _GROWS = {"exponential": "exponentially", "bounded": "within a bound", "unresolved": "by no resolved law"}
 _COMPONENTS = {
@@ -65,8 +67,10 @@ _COMPONENTS = {
     "momentum_squared": "of |M|²",
     "area": "of M·γ",
     "energy": "of the energy",
+    "kovalevskaya": "of Kovalevskaya's integral",
     "omega": "of Ω",
     "gamma": "of γ",
+    "runs": "in whole runs",
 }
 
 
@@ -253,17 +257,21 @@ class Sentence(NamedTuple):
     rows: frozenset[Identity]
 
 
-def sentences(changes: Changes, same: int, failed: Sequence[Row] = (), unsupported: int = 0) -> list[str]:
+def sentences(
+    changes: Changes, same: int, failed: Sequence[Row] = (), unsupported: int = 0, moved: bool = False
+) -> list[str]:
     """At most eight sentences, the most important first; losses before gains.
 
     same: the number of unchanged metrics, where a row without metrics in both reports counts as one.
     failed: rows that failed in both reports, in the same way.  unsupported: the number of rows so in both.
+    moved: whether any of these metrics is not equal.
     """
     if not changes.rows:
         counted = same - unsupported - sum(row.outcome in UNMEASURED for row in failed)
-        numbers = f"{plural(counted, 'metric is', 'metrics are')} within the limits"
+        numbers = f"Nothing changed: {plural(counted, 'metric is', 'metrics are')} within the limits."
+        numbers = f"No metric of {counted} changed beyond its limit." if moved else numbers
         nothing = f"Nothing is compared: {plural(unsupported, 'row is', 'rows are')} not supported in either report."
-        said = [f"Nothing changed: {numbers}."] if counted else [nothing] if unsupported else []
+        said = [numbers] if counted else [nothing] if unsupported else []
         return [*said, *_still_failed(failed), *_yardstick(changes)]
     orders = list(_orders(changes))
     ranked = [*_explained(changes), *(sentence for moved, sentence in orders if moved < 0)]
@@ -279,6 +287,8 @@ def sentences(changes: Changes, same: int, failed: Sequence[Row] = (), unsupport
     named = frozenset[Identity]().union(*(group.rows for group in ranked))
     unnamed = [change for change in changes.rows if change.identity not in named]
     end = f"{plural(len(unnamed), 'other row' if ranked else 'row')} changed." if unnamed else "No other row changed."
+    if len(unnamed) == 1:
+        end = f"{end[:-1]}, {_where(unnamed[0].identity)}: {line(unnamed[0])}."
     if not same and all(change.verdict in (Verdict.MISSING, Verdict.NEW) for change in changes.rows):
         keys = {msgspec.structs.replace(change.identity.key, case="") for change in changes.rows}
         names = " and ".join(_case(change.identity) for change in changes.rows)
@@ -325,6 +335,7 @@ def line(change: Change) -> str:
         return worst.reason or f"only in the {'candidate' if worst.verdict is Verdict.NEW else 'baseline'}"
     digits, count = change.digits, len(change.findings)
     more = f"; {count} metrics changed" if count > 1 else ""
+    more += next((f"; {finding.reason}" for finding in change.findings if not finding.metric), "")
     better = change.verdict is Verdict.BETTER
     if digits is not None and abs(digits[0] - digits[1]) >= _DIGITS_MOVED and (digits[1] > digits[0]) is better:
         return f"digits right {digits_text(digits[0])} → {digits_text(digits[1])}{more}"
@@ -526,7 +537,8 @@ def _steps_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sen
     for changes in _by_integrator(moved):
         largest = max(changes, key=lambda change: abs(change.growth_of_steps))
         steps = " → ".join(str(row.steps) for row in (largest.old, largest.new) if row)
-        text = f"Steps {steps} at the same setting on {_where(largest.identity)}."
+        same = " at the same setting" if largest.old and largest.new and largest.old.flags == largest.new.flags else ""
+        text = f"Steps {steps}{same} on {_where(largest.identity)}."
         yield Sentence(text, frozenset(change.identity for change in changes))
 
 
@@ -570,7 +582,7 @@ def _law_moved(laws: Sequence[Law], reason: str) -> str:
 def _quantity(quantity: Quantity | None, name: str) -> str:
     """``error along the flow``, ``drift of the energy``; the key of an unknown quantity."""
     if quantity is None:
-        return clip(name, 60)
+        return clip(_WORDS.get(name, name), 60)
     what, component = _WORDS.get(quantity.name, quantity.name.replace("_", " ")), integral_text(quantity.component)
     component = f"of {component}" if quantity.name == DRIFT else component
     return f"{what} {_COMPONENTS.get(quantity.component, component)}".strip()
@@ -606,7 +618,9 @@ def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdic
 
 def _is_covered(change: Change, finding: Finding, quantity: Quantity | None) -> bool:
     """Whether another sentence covers a finding: on whole rows, laws, orders, or digits right."""
-    if not finding.metric or finding.of == "growth" or finding.metric in {order.text for order in _SHOW_ORDER}:
+    if not finding.metric or finding.of == "growth":
+        return True
+    if finding.candidate and finding.metric in {order.text for order in _SHOW_ORDER}:
         return True
     if change.digits is None or abs(change.lost) < _DIGITS_MOVED:
         return False

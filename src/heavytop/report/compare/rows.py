@@ -18,6 +18,7 @@ from heavytop.measure.growth import BENT, CLASSES, Interval
 from heavytop.measure.rounding_bound import RoundingBound
 from heavytop.measure.rounding_noise import least
 from heavytop.measure.scalar import UNRESOLVED
+from heavytop.measure.scorer import OBSERVED_ORDER
 from heavytop.precision import exact
 from heavytop.records import (
     HEYOKA,
@@ -237,6 +238,7 @@ def judge_series(old: Series, new: Series, allowed: float, floor: float, exactly
 
 _STEPS = 2
 """Factor: beyond this ratio of steps, or of evaluations of the field, the method must be another one."""
+_NO_ORDER = "the errors no longer show an order: they are of rounding, or fall by no one power of the step"
 OTHER_QUANTITY: Judged = (Verdict.INCOMPARABLE, "it is declared as a different quantity")
 
 
@@ -352,7 +354,7 @@ class RowComparison:
     timed: whether seconds are compared; repeated: whether those of repeated runs are.
     list_same: False to count unchanged metrics in :attr:`same` instead of listing them.
     failed: rows of the candidate that failed in both reports, in the same way.  unsupported: the number of rows that
-    are not supported in both.
+    are not supported in both.  moved: whether any metric of a row is not equal.
     checked: of the baseline and of the candidate, whether each row was already checked on reading.
     """
 
@@ -365,6 +367,7 @@ class RowComparison:
     same: int = field(default=0, init=False)
     failed: list[Row] = field(default_factory=list, init=False)
     unsupported: int = field(default=0, init=False)
+    moved: bool = field(default=False, init=False)
 
     def __post_init__(self) -> None:
         self.limits = Lookup(self.policy)
@@ -374,6 +377,7 @@ class RowComparison:
         self.same += later.same
         self.failed += later.failed
         self.unsupported += later.unsupported
+        self.moved |= later.moved
         self.limits.hidden |= later.limits.hidden
         self.limits.unused = {i: rule for i, rule in self.limits.unused.items() if i in later.limits.unused}
 
@@ -393,6 +397,7 @@ class RowComparison:
             return [] if ignored else self._whole_row(pair, (Verdict.INCOMPARABLE, reason))
         if new.outcome != SUCCESS and not ignored:
             self.failed.append(new)
+        self.moved = self.moved or old.metrics != new.metrics
         findings = self._metrics(pair)
         if old.laws or new.laws:
             findings += self._laws(pair)
@@ -448,8 +453,9 @@ class RowComparison:
                     self.same += 1
             elif not limits.ignore:
                 if match is None:
-                    lacking = Finding(pair.key, name, Verdict.MISSING, metric.value, None, "the metric is missing")
-                    findings.append(lacking)
+                    order = metric.quantity is not None and metric.quantity.name == OBSERVED_ORDER.name
+                    reason = _NO_ORDER if order else "the metric is missing"
+                    findings.append(Finding(pair.key, name, Verdict.MISSING, metric.value, None, reason))
                     continue
                 verdict, why = self._metric(pair, metric, match, limits)
                 slight = (  # a loss of truncation alone

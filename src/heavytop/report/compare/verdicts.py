@@ -9,6 +9,7 @@ from fractions import Fraction
 
 from heavytop.measure.rounding_bound import RoundingBound
 from heavytop.measure.scalar import RESOLVED_RADII, UNRESOLVED
+from heavytop.measure.scorer import OBSERVED_ORDER
 from heavytop.precision import exact
 from heavytop.records import (
     CONTRADICTION,
@@ -166,7 +167,7 @@ def _durations(old: Metric, new: Metric, limits: Limits, bound: RoundingBound | 
 
 
 def _values(old: Metric, new: Metric, limits: Limits) -> Judged:
-    """Values must agree; neither direction is better."""
+    """Values must agree; neither direction is better, but of an observed order, which may not fall."""
     if old.value == new.value:
         return SAME
     differs = Verdict.WORSE, "a value that must be equal differs"
@@ -174,7 +175,11 @@ def _values(old: Metric, new: Metric, limits: Limits) -> Judged:
         return differs
     a, b = exact(old.number), exact(new.number)
     tolerance = max(limits.value, 10 ** min(limits.noise * allowed_loss(old, new), 300.0) - 1)
-    return SAME if abs(a - b) <= Fraction(tolerance) * max(abs(a), abs(b)) else differs
+    if abs(a - b) <= Fraction(tolerance) * max(abs(a), abs(b)):
+        return SAME
+    if old.quantity is None or old.quantity.name != OBSERVED_ORDER.name:
+        return differs
+    return (Verdict.BETTER, "a higher order") if b > a else (Verdict.WORSE, "a lower order")
 
 
 def judge_seconds(old: float, new: float, timings: Timings) -> Judged:
@@ -253,9 +258,9 @@ _TOO_LONG = {OUT_OF_TIME, NOT_ASKED}
 
 
 def ended(row: Row, which: str) -> str:
-    """``the candidate ended as failed at t = 0: it returned NaN``."""
-    reason = f": {row.reference.reason}" if row.outcome in UNMEASURED else ""
-    return f"the {which} ended as {row.outcome} at t = {row.time_reached}{reason}"
+    """``the candidate ended as failed: it returned NaN``; the time of a run that was measured so far."""
+    how = f": {row.reference.reason}" if row.outcome in UNMEASURED else f" at t = {row.time_reached}"
+    return f"the {which} ended as {row.outcome}{how}"
 
 
 def judge_outcomes(old: Row, new: Row, duration: float) -> Judged | None:
