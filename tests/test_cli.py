@@ -297,7 +297,9 @@ def test_a_gate_in_which_an_integrator_has_no_number_is_not_passed(tmp_path: Pat
     (tmp_path / "mine.toml").write_text('[[integrator]]\nname = "mine"\ncommand = ["./not-built"]\n')
     measure = drift("euler", integrator="mine.toml", runs=[("double", "1", 3)])
     (tmp_path / "gate.toml").write_text(f'name = "gate"\n{measure}')
-    assert run("gate", "--bless", cwd=tmp_path).returncode == 3
+    said = refused("gate", "--bless", cwd=tmp_path, code=3)
+    assert "No row of mine has a number, so no baseline is made: mine: the program ./not-built does not exist" in said
+    assert run("run", *["--plan", "gate.toml", "--out", ".heavytop/baseline"], cwd=tmp_path).returncode == 3
     done = run("gate", "--json", *["--markdown", "changes.md", "--junit", "changes.xml"], cwd=tmp_path)
     said = json.loads(done.stdout)
     assert (done.returncode, said["verdict"]) == (3, "incomparable")

@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 
 from heavytop.errors import InputError, quoted, why
 
-_RESUMABLE = "Make space, or give a writable --out; finished rows are kept for --resume."
+_RESUMABLE = "Give a writable --out, or make space; finished rows are kept for --resume."
 
 
 def without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

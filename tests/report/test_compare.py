@@ -60,7 +60,7 @@ WORDS = {"nan", "missing", "never", "unresolved"}
 def test_a_metric_is_judged_by_its_kind_and_its_size(
     kind: str, old: str, same: str, worse: str, better: str, incomparable: str
 ) -> None:
-    names = {"error": "drift_energy_max", "duration": "break_away_time", "value": "claim", "order": "observed_order_runs"}
+    names = {"error": "drift_energy_max", "duration": "break_away_time", "value": "claim", "order": "observed_order"}
     name, kind = names[kind], kind.replace("order", "value")
     expected = {"same": same, "worse": worse, "better": better, "incomparable": incomparable}
     wanted = {new: verdict for verdict, texts in expected.items() for new in texts.split()}

@@ -7,9 +7,11 @@ from pathlib import Path
 
 from heavytop.api.reports import Comparison
 from heavytop.api.run_folder import PAGE, is_written
-from heavytop.errors import InputError
+from heavytop.errors import InputError, PeerFailed
 from heavytop.features.kinds import KINDS
 from heavytop.files import replace, writable
+from heavytop.integrate.registry import is_third_party
+from heavytop.records import UNSUPPORTED, Row
 from heavytop.report.compare.findings import line
 from heavytop.report.document.document import row_name
 from heavytop.report.render.comparison import headline
@@ -44,8 +46,16 @@ def bless(measured: Path, baseline: Path, summary: str, comparison: Comparison |
 
     The text, with the old and the new numbers of each row that changed, is written to ``measured`` too.  summary: of
     the report.  comparison: with the former baseline; None if that is missing or unreadable.  Raises InputError if
-    a folder cannot be written.
+    a folder cannot be written, and PeerFailed if no row of a third-party integrator has a number.
     """
+    rows_of: dict[str, list[Row]] = {}
+    for row in read_brief(measured, KINDS).rows:
+        subject = row.key.subject
+        if subject.what == "computed" and is_third_party(subject.name) and row.outcome != UNSUPPORTED:
+            rows_of.setdefault(subject.name, []).append(row)
+    for name, rows in rows_of.items():
+        if not any(row.metrics for row in rows):
+            raise PeerFailed(f"No row of {name} has a number, so no baseline is made: {rows[0].reference.reason}.")
     text = f"Begin the baseline of accuracy\n\n{summary}\n" if comparison is None else _moved(comparison)
     replace(measured / MESSAGE, text.encode())
     with writable(baseline, "Give a writable --baseline."):

@@ -77,7 +77,8 @@ def gate(
     except InputError as error:
         if not bless:
             raise
-        say(f"nothing to compare with: {error.cause}")
+        if trusted.exists():
+            say(f"nothing to compare with: {error.cause}")
         return _bless(ended, None, (trusted, baseline), (fresh, out), json)
     write_comparison(differences, markdown, junit, html)
     if bless:
@@ -113,5 +114,5 @@ def _bless(
         print_json(document | {"message": message})
     else:
         commit = f"git add {quote(str(trusted[1]))} && git commit -F {quote(str(fresh[1] / MESSAGE))}"
-        print(f"{message}\nThe baseline has moved: {commit}")
+        print(f"{message}\nThe baseline {'is made' if differences is None else 'has moved'}: {commit}")
     return ExitCode.GOOD if ended.good else ExitCode.INCOMPLETE
