@@ -73,6 +73,8 @@ def invalid(error: Exception, kind: type | None = None) -> str:
         return f"{path} must be {expected}" + ("" if is_number else f"; got {_TYPES.get(match[2], match[2])}")
     if match := re.fullmatch(r"Expected `([^`]*)` (?:of length )?((?:[<>=]+ )?\d+)(, got \d+)?", text):
         what = "of length " if match[1] in ("array", "str") else ""
+        if match[1] == "array" and (rules := _descriptions(kind, path)):
+            return f"{path} must be {rules[-1]}{(match[3] or '').replace(',', ';')}"
         return f"{path} must be {_TYPES.get(match[1], match[1])} {what}{match[2]}{match[3] or ''}".replace(
             ", got", "; got"
         )
@@ -105,8 +107,13 @@ def _words(kind: Any, path: str) -> list[str]:
 
 def _rule(kind: Any, path: str) -> str:
     """The description of the pattern of the key at ``path`` in a record."""
+    return next(iter(_descriptions(kind, path)), "of another form")
+
+
+def _descriptions(kind: Any, path: str) -> list[str]:
+    """The descriptions of the key at ``path`` in a record, the outermost last."""
     descriptions = (getattr(part, "description", None) for part in _parts(_hint(kind, path)))
-    return next((text for text in descriptions if isinstance(text, str)), "of another form")
+    return [text for text in descriptions if isinstance(text, str)]
 
 
 def _parts(kind: Any) -> list[Any]:

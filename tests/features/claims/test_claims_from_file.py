@@ -1,6 +1,7 @@
 """Claims that users write: the worked examples, planted errors in them, and files that mean harm."""
 
 import json
+import re
 import time
 import tomllib
 from importlib.resources import files
@@ -140,13 +141,39 @@ WRONG_KEYS = [
     ({"parameters": {"I-1": "2"}}, "A name must be a letter and up to 30 of .*; got 'I-1'"),
     ({"parameters": {"\x1b[31m": "2"}}, r"A name must be .*; got '\\x1b\[31m'"),
     ({"definitions": {"": "2"}}, "A name must be .*; got ''"),
-    ({"parameters": {"A": "2", "B": 2}}, "parameters.B must be text or a list; got an integer"),
+    ({"parameters": {"A": "2", "B": 2.5}}, "parameters.B must be text or a list; got a number.*\n.*decimals as text"),
     ({"definitions": {"A": "2", "B": ["2"]}}, "definitions.B must be text; got a list"),
     ({"parameter": {"A": "2"}}, "unknown field `parameter` in the file; the nearest key is parameters"),
     ({"top": top() | {"center": ["0", "0", "1"]}}, "unknown field `center` in top; the nearest key is centre"),
     ({"top": top() | {"\x1b[31m": "1"}}, r"unknown field `\\x1b\[31m` in top\."),
     ({"id": "An id"}, "id must be lower-case words joined by hyphens"),
     ({"name": ""}, "name must be text of length >= 1"),
+    ({"top": top() | {"centre": ["0", "1"]}}, "top.centre must be a list of three"),
+    ({"motion": {"matrix": ["1"] * 9}}, "motion.matrix must be three rows of three"),
+    ({"parameters": {"a": ["1", "2"], "b": ["1", "2", "3"]}}, "differ: 2 of a, 3 of b"),
+    ({"parameters": {"a": "sqrt(2)"}}, r"a must be a rational number; got 'sqrt\(2\)'"),
+    ({"definitions": {"a": "b", "b": "1"}}, "definition of a uses b, which is not defined before it"),
+    ({"parameters": {"a": "1"}, "assume": ["a = 1"]}, "left = right is left - right in relations"),
+    ({"parameters": {"a": "1"}, "assume": ["a > 0 and a < 2"]}, "each comparison is a text of its own"),
+    ({"assume": ["Omega3/Omega3 > 0"]}, "assume: 1 depends on Omega3"),
+    ({"top": top(weight="x")}, "Known here: pi; "),
+    *(
+        ({"integral": {"value": text}}, f"Did you mean {re.escape(meant)}\\?")
+        for text, meant in {
+            "omega3": "Omega3",
+            "Ω_3 + w1": "Omega3 + Omega1",
+            "Omega[3]": "Omega3",
+            "2Ω₃(Ω₁ + 1)": "2*Omega3*(Omega1 + 1)",
+            "sin²(Omega3)": "sin(Omega3)^2",
+            "|Omega3|": "abs(Omega3)",
+            "Omega3 = 1": "Omega3 - 1",
+            "gamma1 == 0": "gamma1",
+            "Omega3 = Omega1 + 1": "Omega3 - (Omega1 + 1)",
+            "e^(2*Omega3)": "exp(2*Omega3)",
+            "sign(Omega3)": "(Omega3)/abs(Omega3)",
+            "Omega3^(1/3)": "exp(log(Omega3)/3)",
+        }.items()
+    ),
     ({"start": {"gamma": ["0", "0", "1"]}}, r"a claim of kind 'integral' does not use gamma of \[start\]"),
 ]
 
@@ -163,10 +190,21 @@ def test_a_wrong_key_is_named_in_words(parts, said):
     assert "\x1b" not in str(caught.value)
 
 
-@pytest.mark.parametrize(("value", "verdict"), [("Omega3", "holds"), ("Omega1", "refuted")])
+@pytest.mark.parametrize(
+    ("value", "verdict"),
+    [
+        ("Omega3", "holds"),
+        ("Omega1", "refuted"),
+        ("2·Ω₃² − ln(α) + abs(λ×Ω3) + 10^70*ln", "holds"),
+        ("arctan(Omega3) + arsinh(Omega3) + coth(1 + Omega3^2)", "holds"),
+        ("cot(Ω₁)", "refuted"),
+    ],
+)
 def test_a_first_integral_is_one_at_any_time(value: str, verdict: str) -> None:
     """Every state is the start of a motion, so neither a domain nor times change the verdict."""
-    claim = integral(value, top("2 2 1", "0 0 1"))
+    parameters = {"α": 2, "lambda": ["1"], "ln": ["3", "4"]}
+    of = top("2 2 1", "0 0 1") | {"inertia": [2, "2", 1]}
+    claim = integral(value, of, parameters=parameters, assume=["α ≥ 1"])
     for part in ({}, {"domain": "t>0"}, {"domain": "t<=0", "times": ["-1"]}):
         assert audited(claim | part).verdict == verdict
 

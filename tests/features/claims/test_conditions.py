@@ -199,6 +199,14 @@ def test_the_witness_of_an_integral_has_no_time_and_its_text_no_equations_of_mot
     assert "t" not in wrong.to_json()["equations"][0]["witness"]
 
 
+def test_of_a_quaternion_that_jumps_omega_gamma_and_the_attitude_are_continuous() -> None:
+    quaternion = [f"{part}(t/2)*(t/sqrt(t^2))" if part else "0" for part in ("cos", "", "", "sin")]
+    report = audited(upright("1") | {"motion": {"omega": ["0", "0", "1"], "quaternion": quaternion}})
+    assert report.verdict == "holds"
+    reasons = {c.reason for row in report.rows for c in row.conditions if c.text == "sqrt(t^2) ≠ 0"}
+    assert reasons == {"removable: Omega and gamma are continuous across it"}
+
+
 def test_conditions_stand_in_the_text_and_in_the_json() -> None:
     report = audited(upright("sqrt(t^2)/t"))
     assert report.exit_code == 3

@@ -169,10 +169,22 @@ def test_degenerate_values_nomes_and_later_branches_are_decided(text: str, expec
 
 
 @pytest.mark.parametrize(
-    "text", ["am(1, 2)", "ellipticF(1, 1)", "ellipticPi(2, 1, 1/2)", "modulus(2)", "sn(1, -1/10)", "cn(1, 11/10)"]
+    ("text", "number"),
+    [
+        ("am(1, {})", "2"),
+        ("ellipticF(1, {})", "1"),
+        ("ellipticPi({}, 1, 1/2)", "2"),
+        ("modulus({})", "2"),
+        ("sn(1, {})", "-1/10"),
+        ("cn(1, {})", "11/10"),
+        ("wp3(1, {}, 1)", "3"),
+        ("asin({})", "2"),
+    ],
 )
-def test_beyond_the_parameters_there_is_no_value(text: str) -> None:
-    assert not evaluate(formula(text), {}, 100).is_finite()
+def test_beyond_the_parameters_there_is_no_value(text: str, number: str) -> None:
+    assert not evaluate(formula(text.format("u")), {U: Fraction(number)}, 100).is_finite()
+    with pytest.raises(InputError, match="which is false"):
+        formula(text.format(number))
 
 
 def test_a_parameter_may_have_the_name_of_an_elliptic_function() -> None:

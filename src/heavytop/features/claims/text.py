@@ -69,14 +69,17 @@ def values_text(rows: Sequence[StatementVerdict]) -> list[RenderableType]:
 
     Below the table the proven values, with their radii, and how the motion is known.
     """
-    table = Table(box=None, pad_edge=False)
+    table, reasons = Table(box=None, pad_edge=False), []
     for name in ("number", "at", "verdict", "printed", "digits right", "allowed", "error"):
         table.add_column(name, overflow="fold", no_wrap=name in ("number", "at", "verdict", "digits right"))
     for row in rows:
         figures = row.figures or {}
         right = f"{figures['digits_right']} of {figures['digits_printed']}" if "digits_right" in figures else "?"
         cells = [figures.get("printed", ""), right, figures.get("tolerance", "half a unit")]
-        cells.append(row.residual.removeprefix("off by "))
+        is_known = row.residual.startswith("off by ")
+        error, _, reason = row.residual.partition("; ") if is_known else ("?", "", row.residual)
+        cells.append(error.removeprefix("off by "))
+        reasons += [Text(f"{label(row)} {row.domain}: {reason}")] if reason else []
         table.add_row(Text(label(row)), Text(clip(row.domain, _WIDEST_TIME)), _verdict(row.holds), *map(Text, cells))
     proven = [row for row in rows if row.figures and "proven" in row.figures]
     lines = [Text("Proven: the true number is within the radius of the value.")] if proven else []
@@ -84,7 +87,7 @@ def values_text(rows: Sequence[StatementVerdict]) -> list[RenderableType]:
         known = (row.figures or {})["proven"]
         lines.append(Text(f"  {label(row)} {row.domain}: {known['value']} +/- {known['radius']}"))
     methods = dict.fromkeys(row.note for row in rows if row.note)
-    return [table, Text(), *lines, *(Text(f"Reference: {method}.") for method in methods)]
+    return [table, Text(), *reasons, *lines, *(Text(f"Reference: {method}.") for method in methods)]
 
 
 def label(row: StatementVerdict) -> str:
@@ -204,7 +207,7 @@ def _witnesses(report: Audit) -> list[RenderableType]:
         label = " ".join([_label(row), *(getattr(row, name) for name in _columns(report))])
         points.append((label, f"{ball} at {point}"))
     notes = sorted({(f"{row.branch} {row.domain}", row.note) for row in report.rows if row.note})
-    title = "Witnesses, with the residual as a ball that excludes 0"
+    title = "Witnesses" + ("" if report.kind == "stability" else ", with the residual as a ball that excludes 0")
     return _indented(title, points) + _indented("The domains", notes)
 
 

@@ -366,12 +366,12 @@ class Region:
                     yield text
 
 
-_CONTINUOUS = "the formulas are real and continuous on the whole domain"
-_ATTITUDE = "the attitude of the angles is continuous inside the domain"
+_CONTINUOUS = "{} are real and continuous on the whole domain"
+_ATTITUDE = "the attitude is continuous inside the domain"
 _SAMPLE = "every formula is defined and real at a sample in the domain"
 _DIVISORS = "no divisor in the algebra vanishes"
 _ALGEBRA = "the algebra can represent the formulas"
-_REMOVABLE = "removable: the formulas are continuous across it"
+_REMOVABLE = "removable: {} are continuous across it"
 _AT_THE_END = "proven inside the domain, removable in gamma at its end"
 
 
@@ -556,12 +556,13 @@ class Prover:
                 reason = KEPT
             if not reason and continuous:
                 at_the_end = need not in f.needs and inner.discharge(need)
-                reason = _AT_THE_END if at_the_end else _REMOVABLE if inner.is_removable(need) else ""
+                reason = _AT_THE_END if at_the_end else _REMOVABLE.format(f.subject) if inner.is_removable(need) else ""
             missing = "" if reason else everywhere.assumption_for(need)
             unmet = f"{missing} is not assumed" if missing.endswith("!= 0") else "not shown"
             text = reason or everywhere.fails_everywhere(need) or unmet
             conditions.append(Condition(need.text, bool(reason), text, missing))
-        for text, values, obstacle in ((_CONTINUOUS, f.values, obstacles[0]), (_ATTITUDE, f.attitude, obstacles[1])):
+        texts = _CONTINUOUS.format(f.subject), _ATTITUDE
+        for text, values, obstacle in zip(texts, (f.values, f.attitude), obstacles, strict=True):
             if values:
                 conditions.append(Condition(text, not obstacle, obstacle or "by the rules of composition"))
         if f.pole:

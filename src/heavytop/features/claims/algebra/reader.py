@@ -11,6 +11,7 @@ expression is built, so that no formula takes much time or memory.
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -23,7 +24,7 @@ from typing import Any, NamedTuple, TypeVar
 import sympy
 from flint import arb, fmpq
 
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, nearest, quoted
 from heavytop.features.claims.algebra import elliptic
 from heavytop.features.claims.algebra.conditions import ConditionKind, Need, condition
 from heavytop.features.claims.algebra.elliptic import FORMULAS
@@ -39,6 +40,43 @@ FUNCTIONS: dict[str, tuple[Any, int]] = {
     **{name: (getattr(elliptic, name), 2) for name in elliptic.JACOBI},
     **FORMULAS,
 }
+_SYNONYMS = {"ln": "log", **{f"arc{name}": f"a{name}" for name in ("sin", "cos", "tan", "tan2")}}
+_SHORT = {
+    "abs": "sqrt(x^2)",
+    "cot": "cos(x)/sin(x)",
+    "sec": "1/cos(x)",
+    "csc": "1/sin(x)",
+    "coth": "cosh(x)/sinh(x)",
+    "csch": "1/sinh(x)",
+    **dict.fromkeys(("asinh", "arsinh", "arcsinh"), "log(x + sqrt(x^2 + 1))"),
+    **dict.fromkeys(("acosh", "arcosh", "arccosh"), "log(x + sqrt(x^2 - 1))"),
+    **dict.fromkeys(("atanh", "artanh", "arctanh"), "log((1 + x)/(1 - x))/2"),
+}
+"""Functions of x by their formulas.  A parameter may have the name of one, or of a synonym."""
+_ASCII: dict[str, str] = dict(zip("−·⋅×√≥≤≠", ("-", *"***", "sqrt", ">=", "<=", "!="), strict=True))
+_CONSTANT = ("top.inertia", "top.centre", "top.weight", "relations", "assume")
+"""The formulas that hold neither t nor the state."""
+_VARIABLE = re.compile(r"t|(?:Omega|gamma)[1-3]")
+_NOTATIONS = (
+    (r"^([^=]*[^<>!=\s])\s*==?\s*0$", r"\1"),
+    (r"^([^=]*[^<>!=\s])\s*==?\s*([\w./]+)$", r"\1 - \2"),
+    (r"^([^=]*[^<>!=\s])\s*==?\s*([^=]+)$", r"\1 - (\2)"),
+    (r"\bsign(\([^()]*\))", r"\1/abs\1"),
+    (r"\bcbrt(\([^()]*\))", r"exp(log\1/3)"),
+    (r"\b(\w+)\^\(1/3\)", r"exp(log(\1)/3)"),
+    (r"\b[LM]_?([1-3])\b", r"(I\1*Omega\1)"),
+    (r"\|([^|]*)\|", r"abs(\1)"),
+    (r"\b([a-z]+)(?:\^|\*\*)\(?(\d)\)?\(([^()]*)\)", r"\1(\3)^\2"),
+    (r"\be\^(?=\()", "exp"),
+    (r"\be\^(\w+)", r"exp(\1)"),
+    (r"(?<![A-Za-z_])((?:Omega|gamma|I)[1-3])\s*(?=\()", r"\1*"),
+    (r"\b[wW](?=[1-3]\b)|\bomega_?(?=[1-3]\b)", "Omega"),
+    (r"\b([A-Za-z]+)(?:\[|_\{?)(\d)[]}]?", r"\1\2"),
+    (r"(?<![\w.])(\d+(?:\.\d+)?)\s*(?=[A-Za-z(])|(?<=\))()\s*(?=[\w(])", r"\1*"),
+)
+"""Usual notations, and what a file has in their place."""
+_LONGEST_HINT = 200
+_MAX_LENGTH = 10_000
 _MAX_LENGTH = 10_000
 _MAX_NODES = 2_000
 _MAX_BITS = 4_096
@@ -88,6 +126,40 @@ def parse(text: str, names: Mapping[str, Formula], where: str) -> Formula:
             name: _defined(name, formula) if formula.size.nodes > 1 else formula for name, formula in names.items()
         }
         return _parse(text, symbols, where)
+    except InputError as error:
+        raise InputError(error.cause, _meant(text, names) + error.remedy) from None
+
+
+def _meant(text: str, names: Mapping[str, Formula]) -> str:
+    """``Did you mean FORMULA? `` where another notation gives a formula in these names; else ""."""
+    meant = text[:_LONGEST_HINT]
+    for notation, formula in _NOTATIONS:
+        meant = re.sub(notation, formula, meant)
+    known = [*names, *FUNCTIONS, *_SYNONYMS, *_SHORT]
+    meant = re.sub(
+        r"[A-Za-z]\w*", lambda word: word[0] if word[0] in known else nearest(word[0], known) or word[0], meant
+    )
+    try:
+        _parse(meant, names, "")
+    except InputError:
+        return ""
+    return f"Did you mean {meant}? " if meant != text else ""
+
+
+def plain(text: str) -> str:
+    """A text with ASCII characters for Greek letters, subscripts, exponents and signs: Omega3^(2) for Ω₃²."""
+    text = re.sub("[⁰¹²³⁴-⁹⁻]+", lambda power: f"^({unicodedata.normalize('NFKC', power[0])})", text)
+    return text if text.isascii() else "".join(map(_ascii, text))
+
+
+def _ascii(character: str) -> str:
+    if character in "₀₁₂₃₄₅₆₇₈₉" or character.isalpha():
+        character = unicodedata.normalize("NFKC", character)
+    greek = re.fullmatch(r"GREEK (SMALL|CAPITAL) LETTER (\w+)", unicodedata.name(character[0], ""))
+    if greek is None:
+        return _ASCII.get(character, character)
+    name = str(greek[2]).lower().replace("lamda", "lambda")
+    return name if greek[1] == "SMALL" else name.capitalize()
 
 
 @lru_cache(maxsize=1_000)
@@ -231,10 +303,10 @@ class _Parser(Descent):
         with self._deeper("powers"):
             power = self._factor()
         exponent, needs = power.expression, base.needs | power.needs
-        if not exponent.is_Rational or exponent.q > 2 or abs(exponent.p) > _MAX_EXPONENT:
-            raise self._error(
-                f"the exponent must be an integer or half-integer up to {_MAX_EXPONENT}; write exp() for others"
-            )
+        is_number = base.expression.is_Rational and exponent.is_Integer and base.size.bits * abs(exponent) <= _MAX_BITS
+        if not is_number and (not exponent.is_Rational or exponent.q > 2 or abs(exponent.p) > _MAX_EXPONENT):
+            rule = f"an integer or half-integer up to {_MAX_EXPONENT}"
+            raise self._error(f"the exponent must be {rule}; where x > 0, x^y is exp(y*log(x))")
         if base.expression == 0 and exponent < 0:
             raise self._error("a division by 0")
         factors = (abs(int(exponent.p)) + 1) // int(exponent.q) or 1
@@ -259,7 +331,8 @@ class _Parser(Descent):
         if token[:1].isdigit() or token[:1] == ".":
             return self._number(token)
         if token[:1].isalpha():
-            is_call = token in FUNCTIONS and (token not in self._names or self._next() == "(")
+            is_function = token in FUNCTIONS or token in _SYNONYMS or token in _SHORT
+            is_call = is_function and (token not in self._names or self._next() == "(")
             return self._function(token) if is_call else self._name(token)
         raise self._error(f"a number, a name or '(' expected{f', not {token[:20]!r}' if token else ' at its end'}")
 
@@ -273,22 +346,30 @@ class _Parser(Descent):
 
     def _name(self, token: str) -> Formula:
         if token not in self._names:
-            known = ", ".join(sorted(self._names))
+            is_constant = self._where.startswith(_CONSTANT)
+            known = ", ".join(sorted(n for n in self._names if not (is_constant and _VARIABLE.fullmatch(n))))
             remedy = f"Known here: {known[:400]}; functions: {', '.join(FUNCTIONS)}."
             raise InputError(f"{self._where}: unknown name {token[:40]!r}.", remedy)
         return self._names[token]
 
     def _function(self, token: str) -> Formula:
-        function, count = FUNCTIONS[token]
+        token = _SYNONYMS.get(token, token)
+        function, count = FUNCTIONS.get(token, (None, 1))
         arguments = self._arguments(self.sum)
         if len(arguments) != count:
             raise self._error(f"{token} takes {count} argument{'s' if count > 1 else ''}, not {len(arguments)}")
+        if token in _SHORT:
+            return _parse(_SHORT[token], {"x": arguments[0]}, self._where)
         size = arguments[0].size
         for argument in arguments[1:]:
             size = _added(size, argument.size)
         size = size._replace(nodes=size.nodes + 1)
         inside = tuple(argument.expression for argument in arguments)
-        needs = condition(token, inside).union(*(argument.needs for argument in arguments))
+        needs = condition(token, inside)
+        for need in needs:
+            if not need.expression.free_symbols and need.is_met({}) is False:
+                raise self._error(f"{token} needs {need.text}, which is false")
+        needs = needs.union(*(argument.needs for argument in arguments))
         return self._checked(function(*inside), size, needs)
 
     def _checked(self, expression: sympy.Expr, size: ExpressionBounds, needs: frozenset[Need] = frozenset()) -> Formula:
@@ -315,7 +396,10 @@ Bound = tuple[sympy.Expr, sympy.Expr]
 Comparison = tuple[sympy.Expr, sympy.Expr, ConditionKind]
 """left, right, and the condition on left − right."""
 SIGNS = {">": ConditionKind.POSITIVE, ">=": ConditionKind.NONNEGATIVE, "!=": ConditionKind.NONZERO}
-_OR = {"assume": ", formula >= formula, or formula != formula", "where of [quadrature]": ""}
+_COMPARISON = (
+    "Write: formula < formula, formula > formula, or a chain such as 0 < k < 1{}; each comparison is a text of its own."
+)
+_OR = {"assume": ", with <= and >= too, or formula != formula; an equation left = right is left - right in relations"}
 
 
 def comparisons(text: str, where: str) -> list[tuple[str, str, ConditionKind]]:
@@ -325,8 +409,8 @@ def comparisons(text: str, where: str) -> list[tuple[str, str, ConditionKind]]:
     """
     parts = [part.strip() for part in re.split(r"([<>]=?)", text)]
     sides, signs = parts[::2], parts[1::2]
-    if len({sign[0] for sign in signs}) != 1 or not all(sides) or "=" in "".join(sides):
-        raise InputError(f"{where}: {text[:60]!r} cannot be parsed.", f"Write: formula > formula{_OR[where]}.")
+    if len({sign[0] for sign in signs}) != 1 or re.search(r"\band\b", text) or not all(sides) or "=" in "".join(sides):
+        raise InputError(f"{where}: {text[:60]!r} cannot be parsed.", _COMPARISON.format(_OR.get(where, "")))
     pairs = [pair if signs[0][0] == ">" else pair[::-1] for pair in pairwise(sides)]
     return [(*pair, SIGNS[sign.replace("<", ">")]) for pair, sign in zip(pairs, signs, strict=True)]
 

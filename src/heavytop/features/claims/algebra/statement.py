@@ -47,6 +47,7 @@ class Formulas:
     attitude: functions of the angles that must be continuous inside the domain.  angle_needs: of the angles.
     pole: the condition under which the angles are defined, where they are not on the whole domain.
     sampled: the needs at a sample; None for all, where these have no symbols for first integrals.
+    subject: the values in words.
     """
 
     values: tuple[sympy.Expr, ...] = ()
@@ -55,6 +56,7 @@ class Formulas:
     angle_needs: frozenset[Need] = frozenset()
     pole: str = ""
     sampled: frozenset[Need] | None = None
+    subject: str = "the formulas"
 
 
 @dataclass(frozen=True, slots=True)

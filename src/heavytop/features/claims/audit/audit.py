@@ -20,6 +20,7 @@ import msgspec
 
 from heavytop import files
 from heavytop.errors import HeavyTopError, InputError, invalid, meant, prefixed, quoted, refusal
+from heavytop.features.claims.algebra.reader import plain
 from heavytop.features.claims.audit.components import UserComponent
 from heavytop.features.claims.audit.context import ClaimFile
 from heavytop.features.claims.audit.guard import Answer, AuditEnded, in_time, limit_process, no_memory, too_deep
@@ -52,6 +53,8 @@ _TABLES: dict[str, tuple[str, Callable[[ClaimFile], FileClaim]]] = {
 """The table that each kind of claim needs, and its class."""
 _ANY_TOP = {"inertia": ["1", "1", "1"], "weight": "1", "centre": ["0", "0", "0"]}
 _MAX_BYTES = 100_000
+_MOST_BITS = 10_000
+_AS_TEXT = 'Give decimals as text, "0.1", which is exact. '
 _REMEDY = "`heavytop docs claims-in-toml` describes the format, with examples."
 
 
@@ -72,16 +75,19 @@ def read_claim(path: Path) -> FileClaim | ValueClaim:
 def claim_from_table(table: Mapping[str, Any], where: str) -> FileClaim | ValueClaim:
     """The claim in a TOML table; raises InputError for a table that holds no valid claim."""
     entry, claim = split(table, where)
+    is_value = claim.get("kind") == "value"
+    claim |= {key: _as_text(part, is_value) for key, part in claim.items() if key not in ("name", "source")}
     if "entry" in claim:
         raise InputError(f"{where}: a claim has no key entry.", _REMEDY)
-    if claim.get("kind") == "value":
+    if is_value:
         return _value_claim(claim, entry, where)
     if "value" in claim:
         raise InputError(f"{where}: kind = {quoted(claim.get('kind'))} with [[value]].", 'Use "value".')
     try:
         content = msgspec.convert(claim, ClaimFile)
     except (msgspec.ValidationError, RecursionError) as error:
-        raise InputError(f"{where}: {_with_name(invalid(error, ClaimFile), claim)}.", _REMEDY) from None
+        cause = _with_name(invalid(error, ClaimFile), claim)
+        raise InputError(f"{where}: {cause}.", _AS_TEXT * ("got a number" in cause) + _REMEDY) from None
     if content.kind not in _TABLES:
         rule = f"one of {', '.join(_TABLES)}, value"
         raise refusal(f"{where}: kind", rule, repr(content.kind[:40]), _REMEDY)
@@ -100,6 +106,18 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> FileClaim | ValueC
     content = msgspec.structs.replace(content, entry=entry)
     with prefixed(where):
         return claim_class(content)
+
+
+def _as_text(part: Any, is_printed: bool) -> Any:
+    """A part of a claim with its integers as texts, and its formulas in ASCII unless they are printed numbers."""
+    if isinstance(part, list):
+        return [_as_text(item, is_printed) for item in part]
+    if isinstance(part, dict):
+        named = {name if is_printed else plain(name): _as_text(item, is_printed) for name, item in part.items()}
+        return named if len(named) == len(part) else part
+    if isinstance(part, str):
+        return part if is_printed else plain(part)
+    return str(part) if type(part) is int and part.bit_length() < _MOST_BITS else part
 
 
 def _unused(content: ClaimFile) -> Iterator[str]:
@@ -132,10 +150,10 @@ def _value_claim(table: Mapping[str, Any], entry: Entry | None, where: str) -> V
 
     try:
         with prefixed(where):
-            return ValueClaim(msgspec.convert(table, ValueFile), entry)
+            return ValueClaim(msgspec.convert(table, ValueFile, strict=False), entry)
     except (msgspec.ValidationError, RecursionError) as error:
         cause = re.sub(r"\bvalue\[(\d+)\](\.)?", counted_from_1, invalid(error, ValueFile))
-        raise InputError(f"{where}: {cause}.", f"Give numbers as text, as they are printed. {_REMEDY}") from None
+        raise InputError(f"{where}: {cause}.", _AS_TEXT * ("got a number" in cause) + _REMEDY) from None
 
 
 PAPER = ("ershkov-general", "ershkov-partial")

@@ -14,7 +14,7 @@ import msgspec
 import sympy
 from flint import arb
 
-from heavytop.errors import InputError, prefixed, quoted, refusal
+from heavytop.errors import InputError, quoted, refusal
 from heavytop.features.claims.algebra.conditions import (
     ConditionKind,
     Need,
@@ -50,7 +50,7 @@ from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, Parameters, System,
 
 
 Text = Annotated[str, msgspec.Meta(max_length=20_000)]
-Three = Annotated[list[Text], msgspec.Meta(min_length=3, max_length=3)]
+Three = Annotated[list[Text], msgspec.Meta(min_length=3, max_length=3, description="a list of three")]
 Tensor = Annotated[list[Text | list[Text]], msgspec.Meta(min_length=3, max_length=9)]
 Samples = Annotated[list[Text], msgspec.Meta(min_length=1, max_length=8)]
 
@@ -78,8 +78,12 @@ class ClaimedMotionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True
     omega: Three | None = None
     gamma: Three | None = None
     angles: Three | None = None
-    quaternion: Annotated[list[Text], msgspec.Meta(min_length=4, max_length=4)] | None = None
-    matrix: Annotated[list[Three], msgspec.Meta(min_length=3, max_length=3)] | None = None
+    quaternion: Annotated[list[Text], msgspec.Meta(min_length=4, max_length=4, description="a list of four")] | None = (
+        None
+    )
+    matrix: (
+        Annotated[list[Three], msgspec.Meta(min_length=3, max_length=3, description="three rows of three")] | None
+    ) = None
 
 
 class QuadratureTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -110,7 +114,7 @@ class IntegralTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     states: (
         Annotated[
             list[Annotated[list[Text], msgspec.Meta(min_length=6, max_length=6)]],
-            msgspec.Meta(min_length=1, max_length=8),
+            msgspec.Meta(min_length=1, max_length=8, description="1 to 8 lists of six"),
         ]
         | None
     ) = None
@@ -157,17 +161,18 @@ class ClaimFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def sample_rows(parameters: Mapping[str, Sequence[str] | str]) -> list[dict[str, str]]:
-    """The values of the parameters, one dict per sample; a single value is that of all samples.
+    """The values of the parameters, one dict per sample; a single value is that of all samples, in a list too.
 
     Raises InputError where the lists differ in length.
     """
-    lengths = {len(values) for values in parameters.values() if not isinstance(values, str)}
-    if len(lengths) > 1:
-        raise InputError(f"The samples of the parameters have lengths {sorted(lengths)}.", "Give as many for each.")
-    count = max(lengths, default=1)
+    samples = {name: [values] if isinstance(values, str) else values for name, values in parameters.items()}
+    lengths = {name: len(values) for name, values in samples.items() if len(values) > 1}
+    if len({*lengths.values()}) > 1:
+        counts = ", ".join(f"{count} of {name}" for name, count in lengths.items())
+        raise InputError(f"The numbers of samples differ: {counts}.", "Give as many for each, or one for all.")
     return [
-        {name: values if isinstance(values, str) else values[index] for name, values in parameters.items()}
-        for index in range(count)
+        {name: values[index % len(values)] for name, values in samples.items()}
+        for index in range(max(lengths.values(), default=1))
     ]
 
 
@@ -226,6 +231,7 @@ _SAMPLE_BITS = 512
 _MOST_BITS = 6_640
 """The most bits of numerator and denominator of a number in a sample: 2000 digits."""
 _OF_THE_TOP = "The moments, the weight, the centre of mass and k of a top are constant: use numbers and parameters."
+_ASSUMED = "Assumptions may contain parameters only."
 _OF_PARAMETERS = "Relations may contain parameters only; put conditions on the state into where of [integral]."
 
 
@@ -310,6 +316,10 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     names = {name: symbol(value) for name, value in symbols.items()}
     names |= {"pi": symbol(sympy.pi), **{str(variable): symbol(variable) for variable in variables}}
     for name, text in content.definitions.items():
+        later = content.definitions.keys() - names.keys() - FUNCTION_NAMES.keys()
+        if used := sorted(later.intersection(re.findall(r"\w+", text))):
+            cause = f"The definition of {name} uses {used[0]}, which is not defined before it."
+            raise InputError(cause, "Change the order of [definitions].")
         names[name] = parse(text, names, f"definition of {name}")
     sides = [(parse(a, names, "assume"), parse(b, names, "assume"), kind) for a, b, kind in texts]
     compared = [(a.expression, b.expression, kind) for a, b, kind in sides]
@@ -323,6 +333,7 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     for where, formulas in {"inertia": moments, "centre": arm, "weight": [weight], "rotor": carried}.items():
         _require_constant(f"top.{where}", formulas, _OF_THE_TOP, variables)
     _require_constant("relations", relations, _OF_PARAMETERS, variables)
+    _require_constant("assume", [side for *pair, _ in sides for side in pair], _ASSUMED, variables)
     inertia = tensor_of([part.expression for part in moments], tensor)
     centre = tuple(part.expression for part in arm)
     context = Context(
@@ -355,8 +366,11 @@ def _require_name(what: str, name: str) -> None:
 
 def sample_number(text: str, what: str) -> Fraction:
     """The exact number of a sample, a state or a time; raises InputError for one of thousands of digits."""
-    with prefixed(what):
+    try:
         value = exact(text)
+    except InputError:
+        remedy = "Give a decimal or a fraction; a name for sqrt(2) goes into [definitions]."
+        raise refusal(what, "a rational number", quoted(text), remedy) from None
     if max(value.numerator.bit_length(), value.denominator.bit_length()) > _MOST_BITS:
         raise InputError(f"{what} = {quoted(text)[1:-1]} is too long a number.", "Use numbers of at most 2000 digits.")
     return value

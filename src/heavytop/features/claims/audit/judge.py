@@ -216,7 +216,8 @@ def _judge_one(statement: Statement, setting: Setting, prover: Prover) -> Statem
         if witness is not None:
             left = f"0 at the witness, its derivative of order {order} {witness['value']}"
             return _row(statement, False, left, conditions, witness)
-    bound = "0 if the conditions hold" if proven else _bound(statement, prover)
+    is_empty = not prover.sample_points(statement)
+    bound = "0 if the conditions hold" if proven and not is_empty else _bound(statement, prover)
     return _row(statement, None, bound, conditions)
 
 
@@ -273,7 +274,9 @@ def _ball(residual: sympy.Expr, values: Mapping[sympy.Symbol, Fraction], bits: i
 
 
 def _bound(statement: Statement, prover: Prover) -> str:
-    sample_points = [point for point in prover.sample_points(statement) if prover.is_defined(statement, point)]
+    if not (sample_points := prover.sample_points(statement)):
+        return "no sample lies there"
+    sample_points = [point for point in sample_points if prover.is_defined(statement, point)]
     balls = [_ball(statement.residual, values, _BITS[-1]) for values in sample_points]
     bounds = [abs(ball).upper() for ball in balls if ball is not None]
     if not bounds:

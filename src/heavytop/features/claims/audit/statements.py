@@ -6,7 +6,7 @@ The fields, integrals and angles are those of :mod:`heavytop.top`, over sympy.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import sympy
@@ -81,12 +81,14 @@ class ClaimedMotion:
     @property
     def formulas(self) -> Formulas:
         """The formulas that the equations in Ω and γ rest on."""
-        return Formulas((*self.state, *self.clock), self.needs)
+        # a quaternion may jump to −q, which is the same attitude
+        subject = "Omega and gamma" if self.identities else "the formulas"
+        return Formulas((*self.state, *self.clock), self.needs, subject=subject)
 
     @property
     def angle_formulas(self) -> Formulas:
         """The formulas that the equations in the angles rest on."""
-        return Formulas((*self.state, *self.clock), self.needs, self.attitude, self.angle_needs, self.pole)
+        return replace(self.formulas, attitude=self.attitude, angle_needs=self.angle_needs, pole=self.pole)
 
 
 def differences(left: Iterable[sympy.Expr], right: Iterable[sympy.Expr], text: str) -> Identities:
