@@ -612,6 +612,10 @@ def ordered(values: Any, what: str, remedy: str) -> list[Any]:
     """
     if not isinstance(values, str | bytes | bytearray | Set | Mapping):
         try:
+            if hasattr(values, "__array__"):  # such as a table, which iterates over the names of its columns
+                import numpy
+
+                values = values if isinstance(values, numpy.ndarray) else numpy.asarray(values)
             members = list(islice(values, MOST_MEMBERS + 1))
             if len(members) > MOST_MEMBERS:
                 raise InputError(f"{what} has more than {MOST_MEMBERS} members.", remedy)

@@ -64,6 +64,11 @@ def of_columns(change: "engine_files.Change", *names: str) -> "engine_files.Log"
     return Log(VECTORS if names != QUATERNION else QUATERNION, spoil=engine_files.each(change, *names))
 
 
+def one_step_late(steps: list[int], h: float) -> list[float]:
+    """Times of which the first alone is right."""
+    return [0.0, *((n - 1) * h for n in steps[1:])]
+
+
 def frozen(rows: list[np.ndarray]) -> list[np.ndarray]:
     return rows[:8] + 5 * rows[8:9]
 
@@ -80,6 +85,8 @@ RIGHT = {"inertia": engine_files.six(FINE.tensor)}
 """What a file says of an engine that has another tensor about the centre of mass."""
 STEINER = FINE.about_pivot() - FINE.tensor
 I12_TURNED = np.array([[1, -1, 1], [-1, 1, 1], [1, 1, 1]])
+NED = engine_files.each(lambda position: position * [1, -1, -1], "position")
+I11_I22 = FINE.tensor + (FINE.tensor[1, 1] - FINE.tensor[0, 0]) * np.diag([1, -1, 0])
 TURNED = FINE.rotation @ engine_files.exponential(np.array([-0.6, 0.2, -0.6]))
 START = engine_files.text(engine_files.quaternion(TURNED))
 IN_FILE = [
@@ -111,7 +118,14 @@ IN_FILE = [
      {"column": "M2", "term": "the gyroscopic term"}),
     ("steiner", replace(FINE, tensor=FINE.tensor + STEINER), Log(keys=RIGHT), {"times": "2"}),
     ("products_of_inertia", replace(FINE, tensor=FINE.tensor * I12_TURNED), Log(keys=RIGHT), {"entries": "I12"}),
-    ("mass", replace(FINE, mass=1.3 * FINE.mass), Log(QUATERNION, keys={"mass": repr(FINE.mass)}), {"factor": "1.3"}),
+    ("mass", replace(FINE, mass=FINE.mass / 2), Log(QUATERNION, keys={"mass": repr(FINE.mass)}), {"factor": "0.5"}),
+    ("inertia_unit", FINE, Log(QUATERNION, keys={"mass": repr(1000 * FINE.mass)}), {"factor": "1e3", "or": "mass"}),
+    ("gravity", replace(FINE, gravity=9.80665), Log(QUATERNION, keys={"gravity": "9.81"}), {"gravity": "9.80665"}),
+    ("inertia_axes", replace(FINE, tensor=I11_I22), Log(QUATERNION, keys=RIGHT), {"entries": "I11, I22, I33"}),
+    ("space_axes", FINE, Log((*QUATERNION, "position"), spoil=NED), {"entries": "positions"}),
+    ("omega_reversed", FINE, Log(times=lambda steps, h: [-n * h for n in steps]), {"or": "time_reversed"}),
+    ("times_shifted", FINE, Log(QUATERNION, keys={"start_quaternion": ""}, times=one_step_late), {"shift": "+ 0.005"}),
+    ("omega_scaled", FINE, of_columns(np.radians, "omega"), {"factor": "π/180"}),
     ("times_shifted", FINE, Log(QUATERNION, times=lambda steps, h: [n * h - 0.07 for n in steps]), {"shift": "0.07"}),
     ("frozen", FINE, Log(spoil=lambda columns, _: columns | {"quaternion": frozen(columns["quaternion"])}),
      {"vector": "γ"}),

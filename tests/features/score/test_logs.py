@@ -200,7 +200,7 @@ FORMS |= {
     ),
     "nanoseconds of several seconds": (
         "csv",
-        lambda: exported("stamp.sec,stamp.nanosec", [f"17,{k}00000000" for k in range(11)], "orientation.", "angular."),
+        lambda: exported("sec,nsec", [f"17,{k}00000000" for k in range(11)], "orientation.", "angular."),
     ),
     "rostopic with two stamps": (
         "csv",
@@ -383,8 +383,15 @@ def test_repeated_times_are_one_row_or_an_error_and_a_reset_ends_the_log(tmp_pat
 def test_stamps_in_double_say_how_many_digits_of_the_time_they_keep(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     off = [time * (1 + time * 1e-6) for time in TIMES]
-    for name, places, kept in (("timestamp", 7, True), ("timestamp", 9, True), ("time", 7, True), ("t", 2, False)):
-        stamps = [f"{1.7e9 + time:.{places}f}" for time in off]
+    for name, places, kept in (
+        ("timestamp", 7, True),
+        ("timestamp", 9, True),
+        ("time", 7, True),
+        ("t", 2, False),
+        ("time_ns", 0, False),
+    ):
+        scale = 1 if places else 10**9
+        stamps = [f"{1.7e9 * scale + scale * time:.{places}f}" for time in off]
         lines = [f"{stamp},{line}" for stamp, line in zip(stamps, rows(quaternions()).splitlines(), strict=True)]
         path.write_text(plain(lines).replace("t,qw", f"{name},qw"))
         shown = heavytop("score", path)

@@ -188,7 +188,7 @@ DAMPED += ["-0.0806 -0.0259 -0.5996", "0.1235 0.0112 -0.5927"]
 @pytest.mark.parametrize(
     ("omega", "quaternion", "given", "other", "interval"),
     [
-        # the centre is reversed, but not Steiner's term: mirrored axes explain the first positions, not how they move
+        # the centre is reversed, but not Steiner's term; mirrored axes explain the first positions, not how they move
         ("1.95 -2.01 -0.75", "1 -7 -5 4", "2 0.39 0.16 -0.25 0.93 0.91 0.82 -0.03 0.03 0.02",
          "2 0.39 -0.16 -0.25 1.1062 1.3392 1.1754 -0.1548 0.225 0.1", 20),
         # weight and moments are off: a factor of three digits is no accident only if it is known to more
@@ -209,7 +209,9 @@ def test_positions_alone_are_not_explained_by_accident(omega, quaternion, given,
     if other is not DAMPED:
         positions = ht.propagate(body(other, "pivot"), start, times).positions()
     about = body(given, "centre of mass")
-    assert ht.score(times, top=about, start=start, positions=positions).diagnosis == ()
+    told = ht.score(times, top=about, start=start, positions=positions).diagnosis
+    assert len(told) == (given[:6] == other[:6])
+    assert all(f"at (0.39, -0.16, -0.25), with inertia = {', '.join(other.split()[4:])}" in text for text in told)
 
 
 def test_a_sleeping_top_is_right_in_any_columns(tmp_path: Path) -> None:
@@ -307,6 +309,7 @@ def test_json_says_the_same_as_csv(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_python_takes_arrays_of_any_kind() -> None:
+    pandas = pytest.importorskip("pandas")
     motion, q, omega = BODY
     body = Body(motion.mass, motion.gravity, motion.centre, motion.inertia, motion.about)
     start = ht.State(omega=omega, attitude=Attitude.quaternion(*q, normalize=True))
@@ -317,6 +320,8 @@ def test_python_takes_arrays_of_any_kind() -> None:
     score = ht.score(motion.times, quaternions=quaternions, positions=positions, precision=ht.DOUBLE, **given)
     assert score.digits_kept > 15
     assert set(score.distance) == {"gamma", "attitude", "position", "position_relative"}
+    frame = pandas.DataFrame(quaternions, columns=[*"wxyz"])
+    assert ht.score(motion.times, quaternions=frame, positions=positions, **given).digits_kept == score.digits_kept
     matrices, spins = motion.rotation.astype(float), motion.omega.astype(float)
     whole = ht.score(motion.times, matrices=matrices, omega=spins, require=14, **given)
     assert whole.passed

@@ -233,6 +233,10 @@ def test_what_no_body_has_and_states_in_another_order_are_warnings(tmp_path: Pat
     huge = given | {"states": [[*state[:3], "1e200", *state[4:]] for state in given["states"]]}
     (warning,) = read(written(tmp_path, huge)).warnings()
     assert "differs from 1 by 1.00E+400 at t" in warning
+    of_body = {**given, "mass": given["weight"], "gravity": 1, "about": "pivot", "states": huge["states"]}
+    del of_body["weight"]
+    (warning,) = read(written(tmp_path, of_body)).warnings()
+    assert warning.endswith("are these columns γ?")
 
 
 @pytest.mark.slow

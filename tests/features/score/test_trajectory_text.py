@@ -211,7 +211,7 @@ def test_a_body_is_compared_with_a_case_at_its_own_scale(size: Fraction, changed
         ),
         (table("t,a,b,c,d,e,f"), "The header is not t,omega1.*: Ω, γ not found"),
         ("Position\n" + table(), "Line 2 has 7 columns, not 1"),
-        (table(None, order=range(3)), "without a header Row 1 has 3 columns, not 7"),
+        (table(None, order=range(3)), "without a header row 1 has 3 columns, not 7"),
         (table() + "1,2\n", "Line 7 has 2 columns, not 7"),
         (table() + "2,1,1,1,0,0,1\n", "Lines 6 and 7 have the same time and differ"),
         (table() + "3,1,1,1,0,0,abc\n", "Line 7, column gamma3: 'abc' is not a finite number"),

@@ -169,15 +169,17 @@ def _disagreements(samples: Observations, times: Sequence[Fraction]) -> list[Dia
 
 def used(observed: Observed) -> str:
     """The sentence that names the scored columns and their conventions."""
-    convention = observed.convention
+    convention, is_plain = observed.convention, observed.attitude == "quaternion"
+    order = f"{convention.quaternion_order}, " if is_plain else ""
     how = {
-        "quaternion": f" ({convention.quaternion_order}, {convention.quaternion.replace('_', ' ')})",
+        "quaternion": f" ({order}{convention.quaternion.replace('_', ' ')})",
         "matrix": f" ({convention.matrix.replace('_', ' ')})",
         "euler": f" ({convention.sequence}, {convention.angles})",
         "position": " of the centre of mass" if convention.point is None else " of the point",
     }
     up = f"; {convention.up} points up" if set(observed.names) - {"omega", "gamma"} else ""
-    return f"Scored: {', '.join(_WORDS[name] + how.get(name, '') for name in observed.names)}{up}."
+    words = {**_WORDS, "quaternion": observed.attitude}
+    return f"Scored: {', '.join(words[name] + how.get(name, '') for name in observed.names)}{up}."
 
 
 PEER = "heyoka"

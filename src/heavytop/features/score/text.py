@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict
 from fractions import Fraction
@@ -77,7 +78,7 @@ _CONVENTION_SENTENCES = {
     "steiner": "The tensor given plus {times} times its Steiner term m (r² 1 − r rᵀ) fits: its reference point is not "
     "the one given",
     "weight": "The weight is {factor} times the weight given",
-    "mass": "The mass is {factor} times the mass given, in the weight and in the Steiner term",
+    "mass": "The mass is {factor} times the mass given",
     "top": "{number} is {factor} times the value given",
     "start": "The start differs: rotated by {angle} degrees, with Ω = ({omega}) in body axes",
     "column_scaled": "{column} is scaled by {factor}",
@@ -88,8 +89,10 @@ _CONVENTION_SENTENCES = {
     "omega_zero": "Ω is 0 in every sample, and the other columns fit: Ω was not written",
     "omega_shifted": "Ω is shifted in time: Ω given at t belongs to t {shift}",
     "times_shifted": "The times are shifted: the state given at t belongs to t {shift}",
+    "time_reversed": "The states are those at −t",
     "time_unit": "The times are in another unit: the state given at t belongs to {factor}·t",
     "gravity_sign": "Gravity is reversed: g has the opposite sign, or the third space axis points down",
+    "gravity": "The acceleration of gravity is {gravity}, not that given",
     "gravity_unit": "Gravity is in another unit: the weight is {factor} times the weight given",
     "products_of_inertia": "The products of inertia have the opposite sign: the definition is I12 = −∫xy dm",
     "centre_reversed": "The centre of mass is on the opposite side: −centre, as measured from the centre of mass",
@@ -144,8 +147,10 @@ def sentence(fit: Diagnosis) -> str:
 def _mistake(fit: Diagnosis) -> str:
     numbers = fit.numbers
     mistake = "; ".join(_CONVENTION_SENTENCES[kind].format(**numbers) for kind in fit.kind.split("+"))
+    mistake = mistake.replace("rotated by 0 degrees, with ", "")
     mistake += f" ({numbers['entries']} only)" if "entries" in numbers else ""
     mistake += f" ({numbers['steps']})" if "steps" in numbers else ""
+    mistake += f", with inertia = {numbers['inertia']} about the pivot" if "inertia" in numbers else ""
     where = {
         "columns": ", in the columns only",
         "start": ", in the start only",
@@ -266,7 +271,7 @@ def _other_mistake(fit: Diagnosis, system: str) -> str:
         "columns_said": _columns(numbers),
         "order": f"axes {', '.join(numbers.get('axes', ''))} as 1, 2, 3",
         "named": ", ".join(f"{name} = {value}" for name, value in numbers.items()),
-        "about": ", moments about the fixed point" if {"I11", "I22", "I33"} & numbers.keys() else "",
+        "about": ", moments about the fixed point" if re.search(r"\bI\d\d", " ".join(numbers)) else "",
         "system": system,
         "other_system": _SYSTEM.get(system, ""),
         "signed": f"− {shift[1:]}" if shift.startswith("-") else f"+ {shift}",

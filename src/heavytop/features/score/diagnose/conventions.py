@@ -164,11 +164,13 @@ class ConventionSearch(Search):
         kind, numbers, supposed = row
         judged = {name: supposed[name] for name in ("drop", "is_round") if name in supposed}
         supposed = {name: value for name, value in supposed.items() if name not in judged}
-        left = self.errors_if(self.early, **supposed)
+        # a row t = 0 may be right where all later ones are late
+        late = slice(int("shift" in supposed and "rates" not in supposed and not self.times[0]), None)
+        left = self.errors_if(self.early, **supposed)[late]
         if supposed.keys() & {"start", "body", "shift", "unit", "begin"} and not float(left.max()) <= self.refused:
-            left = numpy.append(left, numpy.full(len(self.file_errors) - len(left), numpy.inf))
+            left = numpy.append(left, numpy.full(len(self.file_errors) - len(left), numpy.inf))[late]
         else:
-            left = self.errors_if(self.samples, **supposed)
+            left = self.errors_if(self.samples, **supposed)[late]
         return Hypothesis(kind, {"of": DATA, **numbers}, left, **judged)
 
     def simulated(
@@ -254,6 +256,7 @@ def _steps(search: ConventionSearch) -> Iterator[Row]:
     has_more = bool(rates) and len(search.samples.columns) > len(rates)
     if has_more and not any(values.any() for values in rates.values()):
         yield "omega_zero", {}, {"still": True}
+    yield "time_reversed", {}, {"unit": Fraction(-1)}
     if search.samples.columns.keys() <= {"omega_space", "position"}:  # of which the other search knows nothing
         turns = turning(search.samples.body, search.start) * abs(float(search.samples.times[-1]))
         for factor in sorted(factor for factor in TIME_UNITS if factor * turns <= FARTHEST):
@@ -445,6 +448,7 @@ def _readings(samples: Observations) -> Iterator[Named]:
         ("euler", "angles_of_inverse", {}, {"negated": True, "extrinsic": True}),
         ("omega", "omega_frame", {"frame": frame, "key": f"frame = {frame}"}, {"swapped": True}),
         *(("omega", f"omega_in_{unit}", {}, {"omega": factor}) for unit, factor in UNITS_OF_OMEGA.items()),
+        ("omega", "omega_scaled", {"factor": "π/180"}, {"omega": _UNITS["π/180"]}),
         ("omega", "omega_reversed", {}, {"omega": -1.0}),
         ("omega", "momentum", {}, {"momentum": True}),
         ("gamma", "gamma_down", {}, {"gamma": -1.0}),
@@ -491,24 +495,38 @@ def _bodies(samples: Observations) -> Iterator[tuple[str, dict[str, str], BodyDa
                 signs[i, j] = signs[j, i] = -1.0
             entries = {} if len(which) == len(pairs) else {"entries": ", ".join(f"I{i + 1}{j + 1}" for i, j in which)}
             yield "products_of_inertia", entries, replace(body, inertia=body.inertia * signs)
+        for order in list(permutations(range(3)))[1:]:
+            inertia, numbers = off + numpy.diag(numpy.diag(body.inertia)[list(order)]), {"entries": "I11, I22, I33"}
+            yield (
+                "inertia_axes",
+                {"axes": "".join(str(i + 1) for i in order), **numbers},
+                replace(body, inertia=inertia),
+            )
         moments, axes = principal(body.inertia)
         for turn in (numpy.eye(3), *(numpy.array(matrix) for matrix, _ in _rotations())):
             named_so, reordered = axes @ turn, turn.T * moments @ turn
             yield "tensor_axes_conjugated", {}, replace(body, inertia=named_so.T @ reordered @ named_so)
-    here = next((name for name in _STANDARD if float(name) == body.gravity), None)
-    standard = {f"{name}/{here}": float(name) / body.gravity for name in _STANDARD if here not in (None, name)}
-    for name, factor in (_GRAVITIES | standard).items():
+    if body.gravity in map(float, _STANDARD):
+        for name in _STANDARD:
+            yield "gravity", {"gravity": name}, replace(body, gravity=float(name))
+    for name, factor in _GRAVITIES.items():
         yield "gravity_unit", {"factor": name}, replace(body, gravity=body.gravity * factor)
     yield "centre_reversed", {}, replace(body, centre=-body.centre)
     yield from _in_space_axes(samples)
     for name, factor in _INERTIAS.items():
         yield "inertia_unit", {"factor": name}, replace(body, inertia=body.inertia * factor)
+    for name in ("1000", "1/1000") if body.mass else ():
+        yield "mass", {"factor": name}, replace(body, mass=(body.mass or 0.0) * _LENGTHS[name])
     for name, factor in _LENGTHS.items():
         yield "centre_unit", {"factor": name}, replace(body, centre=body.centre * factor)
     rotor = numpy.zeros(3) if body.rotor is None else body.rotor
     for kind, numbers, inertia, centre, turned in other_axes(body.inertia, body.centre, rotor):
         renamed = replace(body, inertia=inertia, centre=centre, rotor=None if body.rotor is None else turned)
         yield "body_data_axes" if kind == "top_axes" else kind, numbers, renamed
+    for kind, numbers, tensor, centre, _ in other_axes(body.tensor, body.centre, rotor):
+        if kind in ("centre_axes", "centre_signs") and body.about_centre and body.steiner.any():
+            numbers["inertia"] = _list(tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
+            yield kind, numbers, replace(body, inertia=tensor, centre=centre, about_centre=False)
 
 
 def _in_space_axes(samples: Observations) -> Iterator[tuple[str, dict[str, str], BodyData]]:
@@ -539,7 +557,11 @@ def _positions(samples: Observations) -> Iterator[Row]:
 
 def _renamed(samples: Observations) -> Iterator[Row]:
     """Axes of the body or of space in another order or reversed, without a mirror image."""
+    beside = {"position"} < samples.columns.keys() and bool(_forms(samples) & set(FORMS))
     for matrix, axes in _rotations():
+        if beside:
+            mixed = {"mixed": ("position", numpy.array(matrix))}
+            yield "space_axes", {"axes": axes, "entries": "positions"}, mixed
         space, body = replace(samples.declared, space=matrix), replace(samples.declared, body=matrix)
         for kind, reading in (("space_axes", space), ("body_axes", body)):
             yield from _scopes(samples, kind, {"axes": axes}, reading)

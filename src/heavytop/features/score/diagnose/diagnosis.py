@@ -39,7 +39,7 @@ from heavytop.features.score.diagnose.search import (
     scope,
 )
 from heavytop.measure.scalar import EXPLAINS, LEAST, Rounding, roundings
-from heavytop.precision import Precision, decimal_text
+from heavytop.precision import Precision, decimal_text, plain_decimal
 from heavytop.top.equations import System, holding
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -268,7 +268,7 @@ def _off_alone(examined: Examined | None, times: Sequence[Fraction], errors: Arr
     if not off or (last in off and (len(off) > 1 or not _jumps(examined, times, last, errors))):
         return None
     error, left = (min(float(errors[row]), float_info.max) for row in (order[0], order[len(off)]))
-    where = ", ".join(decimal_text(times[row], 6) for row in off)
+    where = ", ".join(plain_decimal(times[row], 6) for row in off)
     which = ", ".join(str(row + 1) for row in off)
     looked_at = None if len(errors) == len(times) else (len(errors), len(times), decimal_text(times[last], 6))
     numbers = {"t": where, "state": f"{which} of {len(errors)}"}

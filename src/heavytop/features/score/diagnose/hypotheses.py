@@ -155,6 +155,8 @@ def constant_column(run: Examined, truth: Array) -> Iterator[Hypothesis]:
 
 _SINGULAR = 1e-4
 """The integrals determine one top if the smallest singular value is below this part of the next."""
+_PARTS = (1.0, 0.5, 0.25, 0.1)
+"""Parts of a step of Gauss-Newton, of which the first that reduces the sum of squares is taken."""
 _NEAR = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10)
 """Relative widths within which a fitted number may be rounded; the first that keeps the error small is taken."""
 _MOST_CHANGED = 3
@@ -704,9 +706,10 @@ def gauss_newton(off: Callable[[Array], Array], x: Array, slight: float, most: i
         slopes = [(off(x + slight * unit) - here) / slight for unit in numpy.eye(len(x))]
         if not all(numpy.isfinite(part).all() for part in (here, *slopes)):
             break
-        after = x - numpy.linalg.lstsq(numpy.stack(slopes, axis=1), here, rcond=_NOISE)[0]
-        there = off(after)
-        if not float(there @ there) < float(here @ here):
+        step = numpy.linalg.lstsq(numpy.stack(slopes, axis=1), here, rcond=_NOISE)[0]
+        tried = ((after := x - part * step, off(after)) for part in _PARTS)
+        after, there = next((pair for pair in tried if float(pair[1] @ pair[1]) < float(here @ here)), (x, here))
+        if there is here:
             break
         falls, x, here = float(here @ here) > _FALLS * float(there @ there), after, there
         if not falls:

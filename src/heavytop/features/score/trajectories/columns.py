@@ -486,6 +486,12 @@ def columns(document: Mapping[str, Any], convention: Convention) -> ColumnTable:
     return table
 
 
+def attitude(document: Mapping[str, Any]) -> str:
+    """The name of the columns that are read as a quaternion."""
+    places = document["header"].places if "header" in document else {}
+    return _words(next((name for name in _TO_QUATERNION if name in places), "quaternion"))
+
+
 _TO_QUATERNION = {"rodrigues": of_rodrigues, "rotation_vector": of_rotation_vector}
 
 

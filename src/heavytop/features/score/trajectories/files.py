@@ -18,7 +18,7 @@ from heavytop import written_numbers
 from heavytop.arguments import MOST_STATES
 from heavytop.cases import Case
 from heavytop.display import plural
-from heavytop.errors import InputError, meant, nearest, quoted, refusal
+from heavytop.errors import InputError, meant, nearest, prefixed, quoted, refusal
 from heavytop.features.score.trajectories import bags, logs
 from heavytop.features.score.trajectories import columns as observed_columns
 from heavytop.features.score.trajectories.observed import (
@@ -181,7 +181,7 @@ def _without_header(first: Sequence[str]) -> tuple[Sequence[str], list[str]]:
     names = logs.TUM if width == len(logs.TUM) and logs.is_unit(first[-4:]) else COLUMNS
     if width != len(names):
         raise InputError(
-            f"The header is not {','.join(COLUMNS)}: without a header Row 1 has {plural(width, 'column')}, not 7.",
+            f"The header is not {','.join(COLUMNS)}: without a header row 1 has {plural(width, 'column')}, not 7.",
             "Give a header that names the columns.",
         )
     return names, [f"columns without a header, read as {' '.join(names)}"]
@@ -382,10 +382,9 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
     piped = str(path) == "-"
     if not piped and path.exists() and not path.is_dir() and path.suffix.lower() not in _SUFFIXES:
         raise InputError(f"{shown_path} must end in one of {', '.join(_SUFFIXES)}.", REMEDY)
-    with readable(f"The trajectory {shown_path}", REMEDY):
+    with readable(f"The trajectory {shown_path}", REMEDY), prefixed(shown_path):
         content = sys.stdin.buffer.read() if piped else read_whole(path)
-        text = _text_of(path, content)
-    text = logs.as_table(text)
+        text = logs.as_table(_text_of(path, content))
     if re.match(r'\s*\{\s*"schema"\s*:\s*"heavytop-report', text):
         raise InputError(f"{shown_path} is a report, not a trajectory.", f"`heavytop show {shown_path}` shows it.")
     is_json = text.lstrip().startswith("{") if piped else path.suffix.lower() == ".json"
@@ -485,6 +484,7 @@ def _observed(document: dict[str, Any], stem: str, case: Case | None, normalize:
     notes += (f"ignored keys: {', '.join(words)}",) if words else ()
     precision = _precision(document, table.texts)
     quantities, rows = observed(body, raw, convention, table.values, table.places, precision, normalize)
+    quantities = replace(quantities, attitude=observed_columns.attitude(document))
     top, start = quantities.posed.top, quantities.posed.start
     require_physical(top, start)
     about = _about(document, stem, case, None in rows) | {"observed": quantities, "notes": notes}
@@ -536,7 +536,7 @@ def _body(document: dict[str, Any], case: Case | None) -> AnyBody:
     mass, gravity, about = (_text(document, key, "") for key in ("mass", "gravity", "about"))
     for key, value in (("mass", mass), ("gravity", gravity)):
         if not value:
-            raise InputError(f"The key {key} is missing.", "Give mass and gravity; either may be 0.")
+            raise InputError(f"The key {key} is missing.", "Give both; gravity may be 0.")
     if not written_numbers.finite(gravity, "gravity"):
         document = {"centre": ["0", "0", "0"], **document}
     inertia, centre = _list(document, "inertia"), _list(document, "centre", 3)

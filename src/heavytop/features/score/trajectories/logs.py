@@ -28,7 +28,7 @@ VECTORS = ("inertia", "centre", "omega", "gamma", "rotor")
 LISTS = (*VECTORS, "omega_space", "pivot", "point", "start_quaternion", "start_matrix", "start_euler")
 """Keys whose values are lists of numbers."""
 KITTI = ("R11", "R12", "R13", "px", "R21", "R22", "R23", "py", "R31", "R32", "R33", "pz")
-_STAMP = re.compile(r"(?:.*[./_])?(?:stamp|time|clock)[./_](secs?|n(?:ano)?secs?)", re.IGNORECASE)
+_STAMP = re.compile(r"(?:(?:.*[./_])?(?:stamp|time|clock)[./_])?(secs?|n(?:ano)?secs?)", re.IGNORECASE)
 _INSTANT = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:")
 _EPOCHS = ("timestamp", "stamp", "epoch")
 """Names of columns of times that are counted from their first row."""
@@ -178,11 +178,11 @@ def with_one_time(
         names = [re.sub(r"^timestamp\b", "epoch", name) for name in names]  # of the log, not of the message
         names[seconds] = "timestamp [s]"
         del names[nano]
-    plain = [canonical(name) for name in names]
+    plain, instant = [canonical(name) for name in names], ""
     words = [name.partition(" ")[0].lower() for name in plain]
     for position, word in enumerate(words):
         if word in _COUNTED and _INSTANT.match(cells[0][position]):
-            plain[position] = word  # whatever the unit
+            plain[position], instant = word, cells[0][position]  # whatever the unit
             for row in cells:
                 row[position] = decimal_text(_epoch(row[position].replace(" ", "T")), 40)
         if word in _COUNTED:
@@ -204,7 +204,8 @@ def with_one_time(
     last = number(cells[-1][index]) if len(cells) > 1 else Fraction(0)
     if first == 0 or (started and last is not None and abs(first) <= abs(last - first)):
         return names, cells, []
-    note = f"times are counted from the first row, {decimal_text(first, 20)}{_loss([row[index] for row in cells])}"
+    loss = _loss([row[index] for row in cells])
+    note = f"times are counted from the first row, {instant or decimal_text(first, 20)}{loss}"
     for row in cells:
         if (value := number(row[index])) is not None:
             row[index] = decimal_text(value - first, 40)
@@ -222,11 +223,15 @@ def _places(word: str, words: Sequence[str], cells: Sequence[Sequence[str]]) -> 
 
 
 def _loss(stamps: Sequence[str]) -> str:
-    """The note on the digits lost to the epoch where all stamps are doubles; empty where none are."""
+    """The note on the digits lost to the epoch where all stamps are decimals of doubles; empty where none are."""
     values = [(value, _last_unit(text)) for text in stamps if (value := number(text)) is not None]
     unit, (first, _), (last, _) = min(unit for _, unit in values), values[0], values[-1]
     spacing = Fraction(math.ulp(float(first)))
-    if spacing < unit or not last > first or any(abs(value - Fraction(float(value))) > unit / 2 for value, _ in values):
+    if (
+        min(spacing, Fraction(1)) <= unit
+        or not last > first
+        or any(abs(value - Fraction(float(value))) > unit / 2 for value, _ in values)
+    ):
         return ""
     digits = int(math.log10((last - first) / spacing))
     return f"; as doubles the stamps keep {digits} digits of the time since then: write nanoseconds as integers"
@@ -479,7 +484,8 @@ def _of_numpy(content: bytes) -> dict[str, Any]:
         names = loaded.files if hasattr(loaded, "files") else loaded.dtype.names
         return {"": loaded} if names is None else {name: loaded[name] for name in names}
     except (ValueError, EOFError, BadZipFile, zlib.error, TokenError, RuntimeError, MemoryError) as error:
-        raise InputError(f"A log must be an array: {error}.", "Save plain numbers, without pickle.") from None
+        reason = str(error).partition(" If you trust")[0].rstrip(".")
+        raise InputError(f"A log must be an array: {reason}.", "Save plain numbers, without pickle.") from None
 
 
 def _of_parquet(content: bytes) -> dict[str, Any]:
@@ -492,7 +498,8 @@ def _of_parquet(content: bytes) -> dict[str, Any]:
         # in this thread: one that still holds the file while Python ends aborts the process
         return _columns_of(pyarrow.parquet.ParquetFile(BytesIO(content)).read(use_threads=False))
     except (pyarrow.ArrowException, ValueError) as error:
-        raise InputError(f"A log must be a Parquet table: {error}.", "Give one number or list for each time.") from None
+        reason = str(error).rstrip(".")
+        raise InputError(f"A log must be a Parquet table: {reason}.", "Give one number or list per time.") from None
 
 
 def _columns_of(table: Any) -> dict[str, Any]:

@@ -254,16 +254,15 @@ class GivenTrajectory:
 
     def warnings(self) -> list[str]:
         """Warnings of data that no rigid body has, and of γ that suggests another order of the columns."""
+        question = f"are the states in the order {' '.join(VARIABLES)}?"
+        rows: Sequence[tuple[Fraction, ...] | None] = [state and state[3:] for state in self.states]
         if self.observed is not None:
-            return [*self.notes, *self.observed.body.warnings()]
-        sentences = [*self.notes, *self.top.warnings()]
-        for time, state in zip(self.times, self.states, strict=True):
-            if state is not None and abs(off := dot(state[3:], state[3:]) - 1) > _ODD_GAMMA:
-                sentences.append(
-                    f"|gamma|^2 differs from 1 by {decimal_text(off, 3)} at t = {shown(time)}: "
-                    f"are the states in the order {' '.join(VARIABLES)}?"
-                )
-                break
+            rows, question = self.observed.columns.get("gamma", []), "are these columns γ?"
+        sentences = [*self.notes, *(self.top if self.observed is None else self.observed.body).warnings()]
+        for time, row in zip(self.times, rows, strict=False):
+            if row is not None and abs(off := dot(row, row) - 1) > _ODD_GAMMA:
+                odd = f"|gamma|^2 differs from 1 by {decimal_text(off, 3)} at t = {shown(time)}"
+                return [*sentences, f"{odd}: {question}"]
         return sentences
 
 
@@ -347,7 +346,7 @@ class Observed:
 
     columns: by the name of the quantity, the rounded numbers of each sample up to the first that is not finite.
     convention: of these columns.  posed: the body and its start in principal axes, rounded to the format before.
-    body, start: both in the axes of the file, for the diagnosis.
+    body, start: both in the axes of the file, for the diagnosis.  attitude: what the quaternions are in the file.
     """
 
     columns: Mapping[str, list[tuple[Fraction, ...]]]
@@ -355,6 +354,7 @@ class Observed:
     posed: Posed
     body: AnyBody
     start: RawStart
+    attitude: str = "quaternion"
 
     @property
     def names(self) -> list[str]:
