@@ -202,6 +202,10 @@ FORMS |= {
         "csv",
         lambda: exported("sec,nsec", [f"17,{k}00000000" for k in range(11)], "orientation.", "angular."),
     ),
+    "seconds beside t": (
+        "csv",
+        lambda: f"{HEAD}t,sec,nsec,qw,qx,qy,qz\n{rows(TIMES, numpy.ones((len(TIMES), 2)), quaternions())}",
+    ),
     "rostopic with two stamps": (
         "csv",
         lambda: exported(

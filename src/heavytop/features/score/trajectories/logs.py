@@ -28,7 +28,7 @@ VECTORS = ("inertia", "centre", "omega", "gamma", "rotor")
 LISTS = (*VECTORS, "omega_space", "pivot", "point", "start_quaternion", "start_matrix", "start_euler")
 """Keys whose values are lists of numbers."""
 KITTI = ("R11", "R12", "R13", "px", "R21", "R22", "R23", "py", "R31", "R32", "R33", "pz")
-_STAMP = re.compile(r"(?:(?:.*[./_])?(?:stamp|time|clock)[./_])?(secs?|n(?:ano)?secs?)", re.IGNORECASE)
+_STAMP = re.compile(r"(?:.*[./_])?(?:stamp|time|clock)[./_](secs?|n(?:ano)?secs?)", re.IGNORECASE)
 _INSTANT = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:")
 _EPOCHS = ("timestamp", "stamp", "epoch")
 """Names of columns of times that are counted from their first row."""
@@ -165,9 +165,9 @@ def with_one_time(
     log: then the clock began with the computer.
     """
     names = list(names)
-    parts = {
-        match[1].lower()[0]: index for index, name in enumerate(names) if (match := _STAMP.fullmatch(name.strip()))
-    }
+    around = "" if {"t", "time"} & {canonical(name).partition(" ")[0].lower() for name in names} else "stamp."
+    stamps = [_STAMP.fullmatch(f"{around}{name.strip()}") for name in names]
+    parts = {match[1].lower()[0]: index for index, match in enumerate(stamps) if match}
     if parts.keys() == {"s", "n"}:
         seconds, nano = parts["s"], parts["n"]
         for row in cells:
