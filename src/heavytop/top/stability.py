@@ -79,19 +79,22 @@ def stability(system: System, parameters: Parameters, start: Sequence[Fraction])
 
 
 def _drift(system: System, p: Parameters, y: Sequence[Fraction]) -> float:
-    """|∂Ω'/∂Ω_k|/|Ω| at a steady free rotation where Ω_k is constant and Ω' linear in the others; 0 where none is.
+    """The rate of :func:`drifts` over |Ω|; 0 where none is."""
+    return next((_root(square / size) for square, size in drifts(system, p, y) if square), 0.0)
 
-    There two moments are equal, and (Ω_i, Ω_j) turns at the constant rate that Ω_k gives it.
+
+def drifts(system: System, p: Parameters, y: Sequence[Any]) -> Iterator[tuple[Any, Any]]:
+    """|∂Ω'/∂Ω_k|² and Ω_i² + Ω_j² at a steady free rotation where Ω_k is constant and Ω' linear in the others.
+
+    There two moments are equal, and (Ω_i, Ω_j) turns at the constant rate that Ω_k gives it.  Exact in any ring.
     """
     along_2 = (Fraction(0), p.rotor, Fraction(0)) if system is GYROSTAT else (p.rotor,) * 3
     rotor = p.rotor if isinstance(p.rotor, tuple) else along_2
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
         if p.inertia[i] == p.inertia[j] and not rotor[i] and not rotor[j]:
-            rates = system.field(p, [value + (n == k) for n, value in enumerate(y)])
-            if square := rates[i] ** 2 + rates[j] ** 2:
-                return _root(square / (y[i] ** 2 + y[j] ** 2))
-    return 0.0
+            rates = system.rates(p, [value + int(n == k) for n, value in enumerate(y)])
+            yield rates[i] ** 2 + rates[j] ** 2, y[i] ** 2 + y[j] ** 2
 
 
 def quadratic_of_squares(system: System, p: Parameters, y: Sequence[Any], size: int = 6) -> tuple[Any, Any]:

@@ -162,6 +162,10 @@ def test_degenerate_parameters_and_poles_are_conditions(
         ("asin(sin(t)) - t", "refuted"),  # from a quarter of the period on
         ("ellipticE(t, 1) - sin(t)", "refuted"),
         ("ellipticF(asin(sn(t, a)), a) - t", "refuted"),
+        ("sn(t + 2*ellipticK(a), a) + sn(t, a) + cn(6*ellipticK(a) - t, a) + cn(t, a)", "holds"),
+        ("am(t - 4*ellipticK(a), a) - am(t, a) + 2*pi + dn(t, a) - dn(2*ellipticK(a) + t, a)", "holds"),
+        ("sn(t + 2*ellipticK(1/3), a) + sn(t, a)", "refuted"),
+        ("dn(t - 2*ellipticK(a), a) + dn(t, a)", "refuted"),
     ],
 )
 def test_degenerate_values_nomes_and_later_branches_are_decided(text: str, expected: str) -> None:

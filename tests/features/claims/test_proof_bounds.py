@@ -409,7 +409,7 @@ def test_a_place_is_one_only_where_the_relations_are_proven_to_be_0() -> None:
         assert len(list(setting(1, relations=(relation,)).sample_points(at_0))) == expected
 
 
-@pytest.mark.parametrize(("bound", "verdict"), [("a > -1", "undecided"), ("a > 0", "holds")])
+@pytest.mark.parametrize(("bound", "verdict"), [("a > -1", "refuted"), ("a > 0", "holds")])
 def test_what_is_above_a_negative_number_is_not_positive(bound: str, verdict: str) -> None:
     table = integral("(sqrt(a^2) - a)*Omega1", top(), parameters={"a": ["1/2"]}, assume=[bound])
     assert audited(table).verdict == verdict

@@ -136,6 +136,10 @@ def test_about_an_axis_of_the_equator_of_a_symmetric_body_omega_drifts() -> None
     for omega, gamma in (("w 0 0", "1 0 0"), ("3*w 4*w 0", "3/5 4/5 0")):
         of = top("I1 I1 I3", "0 0 0", "0")
         assert audit(True, ["I1 > I3", "w > 0"], parameters, of, omega, gamma).verdict == "refuted"
+        assert audit(False, ["I1 > I3", "w > 0"], parameters, of, omega, gamma).verdict == "holds"
+        assert audit(False, ["w > 0"], parameters, of, omega, gamma).verdict == "undecided"  # a sphere
+    for stable, verdict in ((True, "refuted"), (False, "holds")):
+        assert audit(stable, [], AXES, top("I1 I2 I3", "0 0 0", "0"), "0 0 0", UNITS[0]).verdict == verdict
     (stability,) = [row for row in turning(0, True, ["I1 >= I2", "I2 > I3", "w > 0"]).rows if row.holds is False]
     witness = {name: Fraction(value) for name, value in stability.witness["parameters"].items()}
     assert witness["I1"] == witness["I2"]

@@ -19,6 +19,10 @@ UNKNOWN, NONNEGATIVE, POSITIVE = Sign(0, False), Sign(1, False), Sign(1, True)
 @pytest.mark.parametrize(
     ("e", "facts", "weak", "expected"),
     [
+        (P * A**2 + Q * B**2, (A**2 + B**2,), (), POSITIVE),
+        (P * A**2 + Q * B**4, (A * C + B,), (), POSITIVE),
+        (P * A**2 + Q * B**2, (A**2 + C**2,), (), NONNEGATIVE),
+        (P * A**2 + Q * B**2 * C**2, (A**2 + B**2,), (), NONNEGATIVE),
         (A, (A**2 * B,), (), Sign(0, True)),
         (B, (A**2 * B,), (), POSITIVE),
         (A, (), (A**2 * B,), UNKNOWN),

@@ -48,7 +48,7 @@ class Analytic(sympy.Function):  # type: ignore[misc]
 
     @classmethod
     def eval(cls, *arguments: sympy.Expr) -> sympy.Expr | None:
-        """Simpler values: at u = 0 and −u, at m = 0 and 1, and of an inverse function."""
+        """Simpler values: at u = 0, −u and u + 2nK, at m = 0 and 1, and of an inverse function."""
         last = cls.moving - 1
         u, m = arguments[last], arguments[-1]
         if cls.parity and u.could_extract_minus_sign():
@@ -58,6 +58,9 @@ class Analytic(sympy.Function):  # type: ignore[misc]
         inverse = _INVERSE.get(cls.__name__)
         if inverse == type(u).__name__ and u.args[1] == m:
             return u.args[0]
+        if cls.__name__ in _BY_2K and u.has(first) and (n := u.coeff(quarter(m)) / 2).is_Integer and n != 0:
+            factor, turn = _BY_2K[cls.__name__]
+            return factor**n * cls(u - 2 * n * quarter(m), m) + n * turn
         if cls is third and arguments[0] == 0:
             return first(u, m)
         simpler = _DEGENERATE[cls.__name__].get(m) if cls.__name__ in _DEGENERATE else None
@@ -75,6 +78,8 @@ third, thetan = _made("ellipticPi", 3, -1, 2), _made("thetan", 2, 1)
 wp, wp3, wpinverse, wsigma3 = (_made(name, 3, 1) for name in ("wp", "wp3", "wpinverse", "wsigma3"))
 wpprime, wp3prime = (_made(name, 3, -1) for name in ("wpprime", "wp3prime"))
 wzeta, wsigma, wzeta3 = (_made(name, 3, -1) for name in ("wzeta", "wsigma", "wzeta3"))
+_BY_2K = {"sn": (-1, 0), "cn": (-1, 0), "dn": (1, 0), "am": (1, sympy.pi)}
+"""f(u + 2K) = factor f(u) + summand."""
 _INVERSE = {"am": "ellipticF", "ellipticF": "am"}
 _DEGENERATE: dict[str, dict[int, Callable[[sympy.Expr], sympy.Expr]]] = {
     "sn": {0: sympy.sin, 1: sympy.tanh},

@@ -235,7 +235,12 @@ class Signs:
     def _rules(self, p: fmpq_mpoly) -> Iterator[Callable[[fmpq_mpoly], Sign]]:
         yield from (self._by_facts, self._by_number, self._by_terms, self._by_forms)
         if len(p) <= _MAX_COSTLY_TERMS and self._left > 0:
-            yield from (self._by_square_of_a_sine, self._by_roots_of_one_variable, self._by_generators)
+            yield from (
+                self._by_facts_at_its_zeros,
+                self._by_square_of_a_sine,
+                self._by_roots_of_one_variable,
+                self._by_generators,
+            )
             yield from (self._by_difference_from_facts, self._by_products_of_facts)
 
     # --- rules ------------------------------------------------------------------------------------------------------
@@ -279,6 +284,16 @@ class Signs:
                 g = self._ring.generators[index]
                 sign = sign.times(Sign(g.sign if power % 2 else 1, g.strict))
         return sign
+
+    def _by_facts_at_its_zeros(self, p: fmpq_mpoly) -> Sign:
+        """A sum of terms c x^n of one sign, 0 only where each x is, where a fact that is never 0 would be 0 too."""
+        sign, gens = self._by_terms(p), self._ring.generators
+        open_ones = [{i for i, power in enumerate(m) if power and not gens[i].strict} for m in p.to_dict()]
+        if not sign.value or any(len(indices) != 1 for indices in open_ones):
+            return UNKNOWN
+        zeros = set().union(*open_ones)
+        facts = (fact.to_dict() for fact, known in self._facts if known.strict)
+        return Sign(sign.value, any(all(any(m[i] for i in zeros) for m in fact) for fact in facts))
 
     def _by_forms(self, p: fmpq_mpoly) -> Sign:
         """Terms of one sign after each generator is replaced by its form in positive ones."""

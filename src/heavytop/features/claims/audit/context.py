@@ -239,7 +239,7 @@ _OF_PARAMETERS = "Relations may contain parameters only; put conditions on the s
 class Context:
     """The context of a claim: names, assumptions, samples, and the top.
 
-    rotor: λ of a gyrostat; rotor_needs: of it.  carried: k of a heavy gyrostat.
+    rotor: λ of a gyrostat; rotor_needs: of it.  carried: k of a heavy gyrostat.  compared: the assumptions.
     """
 
     names: dict[str, Formula]
@@ -252,6 +252,21 @@ class Context:
     needs: frozenset[Need]
     rotor_needs: frozenset[Need]
     carried: tuple[sympy.Expr, ...] | None = None
+    compared: tuple[Comparison, ...] = ()
+
+    def with_other_samples(self) -> Context:
+        """The context with samples near the first, and with parameters of other signs, as far as the claim admits."""
+        others = []
+        for sign in (1, -1):
+            sample = dict(self.samples[0])
+            for n, (parameter, value) in enumerate(sample.items()):
+                for step in (Fraction(1, 7 + 2 * n), Fraction(-1, 7 + 2 * n)):
+                    trial = {**sample, parameter: sign * (value + step * (abs(value) or 1))}
+                    if _is_admitted(self, trial, self.compared):
+                        sample = trial
+                        break
+            others.append(sample)
+        return replace(self, samples=(*self.samples, *others))
 
     def with_rotor(self, rotor: sympy.Expr | None, is_constant: bool) -> Context:
         """The context with a simplified rotor; raises InputError unless it is shown to be constant in time."""
@@ -330,6 +345,8 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     rotor = parse(top.rotor, names, "top.rotor") if isinstance(top.rotor, str) else None
     carried = three(top.rotor, names, "top.rotor") if isinstance(top.rotor, list) else ()
     relations = [parse(text, names, "relations") for text in content.relations]
+    weak = [(a, b) for a, b, kind in compared if kind is ConditionKind.NONNEGATIVE]
+    equal = [a - b for index, (a, b) in enumerate(weak) if (b, a) in weak[:index]]
     for where, formulas in {"inertia": moments, "centre": arm, "weight": [weight], "rotor": carried}.items():
         _require_constant(f"top.{where}", formulas, _OF_THE_TOP, variables)
     _require_constant("relations", relations, _OF_PARAMETERS, variables)
@@ -344,7 +361,7 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
             {symbols[name]: sample_number(value, name) for name, value in row.items()}
             for row in sample_rows(content.parameters)
         ),
-        tuple(relation.expression for relation in relations),
+        (*(relation.expression for relation in relations), *equal),
         Parameters(inertia, tuple(weight.expression * part for part in centre), sympy.Integer(0)),
         None if rotor is None else rotor.expression,
         needs_of([*moments, *arm, weight, *carried, *relations]).union(
@@ -352,6 +369,7 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
         ),
         frozenset() if rotor is None else rotor.needs,
         tuple(part.expression for part in carried) or None,
+        tuple(compared),
     )
     _check_samples(context, compared)
     return replace(context, samples=(*context.samples, *_at_equality(context, compared)))
@@ -448,10 +466,15 @@ def _at_equality(context: Context, compared: Sequence[Comparison]) -> Iterator[d
                 if not value.is_Rational:
                     continue
                 at_end = {**sample, parameter: Fraction(value)}
-                moments = (_at(moment, at_end) for moment in minors(context.top.inertia))
-                if all(m > 0 for m in moments) and not any(_broken(context, at_end, compared)):
+                if _is_admitted(context, at_end, compared):
                     yield at_end
                     break
+
+
+def _is_admitted(context: Context, sample: dict[sympy.Symbol, Fraction], compared: Sequence[Comparison]) -> bool:
+    """Whether a sample has positive moments and breaks no assumption or relation."""
+    moments = (_at(moment, sample) for moment in minors(context.top.inertia))
+    return all(m > 0 for m in moments) and not any(_broken(context, sample, compared))
 
 
 def _at(expression: sympy.Expr, sample: dict[sympy.Symbol, Fraction]) -> arb:

@@ -218,6 +218,8 @@ def _judge_one(statement: Statement, setting: Setting, prover: Prover) -> Statem
             return _row(statement, False, left, conditions, witness)
     is_empty = not prover.sample_points(statement)
     bound = "0 if the conditions hold" if proven and not is_empty else _bound(statement, prover)
+    if not proven:
+        conditions = (*conditions, Condition("the residual is 0", False, "not shown, and no sample tried refutes it"))
     return _row(statement, None, bound, conditions)
 
 

@@ -24,11 +24,11 @@ from heavytop.features.claims.audit.context import ClaimFile
 from heavytop.features.claims.audit.judge import Progress, StatementVerdict, silent, verdict_of
 from heavytop.features.claims.audit.user_claims import UserMotion
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
-from heavytop.top.stability import is_stable, quadratic_of_squares, stability
+from heavytop.top.stability import drifts, is_stable, quadratic_of_squares, stability
 
 _CRITERIA = {
     True: "the second variation of a combination of first integrals is definite on their level",
-    False: "an eigenvalue of the linearised equations has a positive real part",
+    False: "an eigenvalue has a positive real part, or a free body drifts: at rest, or with two equal moments",
 }
 
 
@@ -83,18 +83,28 @@ class UserStability(UserMotion):
                 continue
             top = Parameters(tuple(values[:3]), tuple(values[3:6]), Fraction(0))
             steady = stability(about, top, values[6:])
-            if steady is not None and steady.verdict == ("unstable" if self.content.stable else "stable"):
-                rate = f", at the rate {steady.rate:.6g}" if steady.rate else ""
+            at_rest = _is_at_rest(top, values[6:])
+            verdict = "unstable" if at_rest else steady.verdict if steady is not None else ""
+            if verdict == ("unstable" if self.content.stable else "stable"):
+                why = ": however small its Ω, γ drifts away linearly" if at_rest else steady.why if steady else ""
+                rate = f", at the rate {steady.rate:.6g}" if steady and steady.rate else ""
                 parameters = {str(s): str(value) for s, value in sample.items() if s != TIME}
-                yield f"{steady.verdict} at the witness{rate}", {"parameters": parameters}
+                yield f"{verdict}{rate}{why}", {"parameters": parameters}
 
     def _is_proven(self, about: System, assumptions: Assumptions) -> bool:
         p, y, sign = self.context.parameters(about), self.motion.state, partial(_sign, assumptions)
         if self.content.stable:
             return is_stable(p, y, sign)
+        if _is_at_rest(p, y) or (not any(p.moment) and any(sign(square) == 1 for square, _ in drifts(about, p, y))):
+            return True
         a, b = quadratic_of_squares(about, p, y)
         # where b < 0 the root is not real, and the motion unstable
         return any(sign(e) == 1 for e in (-a, -b, 4 * b - a**2, 2 * sympy.sqrt(sympy.factor(b)) - a))
+
+
+def _is_at_rest(p: Parameters, y: Sequence[Any]) -> bool:
+    """Whether a free body is at rest: with the least Ω, γ turns away."""
+    return not any(p.moment) and not any(y[:3])
 
 
 @where_provable(None)

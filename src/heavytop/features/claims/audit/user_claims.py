@@ -9,8 +9,8 @@ from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
-from itertools import islice
-from time import perf_counter
+from itertools import islice, product
+from time import process_time
 
 import msgspec
 import sympy
@@ -69,11 +69,18 @@ from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, System
 Rate = Callable[[sympy.Expr], sympy.Expr]
 _NO_FORMULAS = ("name", "kind", "stable", "system", "source", "domain", "assume", "parameters", "definitions", "entry")
 _SEARCH, _MOST_ASSUMPTIONS = 6.0, 3
-"""Seconds for assumptions that would decide a claim, and the largest number of them."""
+"""Seconds of the processor for assumptions that would decide a claim, and the largest number of them."""
+_MOST_SECONDS = 3.0
+"""Of an undecided audit that is done again with further samples."""
 
 
 class FileClaim(ABC):
-    """A claim of a file: its kind is motion, component, integral, relation or stability."""
+    """A claim of a file: its kind is motion, component, integral, relation or stability.
+
+    is_searched: whether a witness is looked for at more states than usual.
+    """
+
+    is_searched = False
 
     def __init__(self, content: ClaimFile) -> None:
         self.content = content
@@ -127,9 +134,16 @@ class FileClaim(ABC):
 
     def audit(self, about: System, progress: Progress = silent) -> Audit:
         """The audit as a claim about a system."""
-        content, began = self.content, perf_counter()
+        content, began = self.content, process_time()
         rows = self.rows(about, progress)
-        deciding = () if verdict_of(rows) != "undecided" else self._deciding(about, rows, perf_counter() - began)
+        seconds = process_time() - began
+        deciding: tuple[tuple[str, str], ...] = ()
+        if verdict_of(rows) == "undecided":
+            more = rows
+            with suppress(HeavyTopError):
+                more = self._with_other_samples().rows(about) if seconds < _MOST_SECONDS else rows
+            deciding = self._deciding(about, rows, seconds)
+            rows = more if verdict_of(more) == "refuted" else rows
         return Audit(
             self.name,
             about.name,
@@ -143,18 +157,24 @@ class FileClaim(ABC):
             where=() if content.integral is None else tuple(content.integral.where),
         )
 
+    def _with_other_samples(self) -> FileClaim:
+        """The claim with further samples and states for a witness."""
+        claim = type(self)(self.content)
+        claim.context, claim.is_searched = claim.context.with_other_samples(), True
+        return claim
+
     def _deciding(self, about: System, rows: Sequence[StatementVerdict], seconds: float) -> tuple[tuple[str, str], ...]:
         """Assumptions each of which decides an undecided claim, with the verdict then.
 
         seconds: duration of the audit; the search ends after :data:`_SEARCH`.
         """
-        began, assumed = perf_counter(), self.content.assume
+        began, assumed = process_time(), self.content.assume
         signs = set(re.findall(r"\w+", " ".join(text for text in assumed if "!=" not in text)))
         bounds = [c.assumption for row in rows for c in row.conditions if c.assumption and not c.discharged]
         bounds += [f"{name} > 0" for name in self.content.parameters if name not in signs]
         deciding: list[tuple[str, str]] = []
         for bound in dict.fromkeys(bounds):
-            if perf_counter() - began + 2 * seconds > _SEARCH or len(deciding) == _MOST_ASSUMPTIONS:
+            if process_time() - began + 2 * seconds > _SEARCH or len(deciding) == _MOST_ASSUMPTIONS:
                 break
             if (bound.replace(">", "!="), "holds") in deciding:  # a weaker one suffices
                 continue
@@ -316,7 +336,7 @@ def _with_times(clock: Clock, content: ClaimFile) -> Clock:
 _VALUES = tuple(sympy.Rational(*pair) for pair in ((2, 3), (1, 3), (4, 5), (3, 5), (-1, 2), (2, 1), (1, 1), (0, 1)))
 _SCALES = (1, -1, 1, -1, 20, -20)
 _MOST_STEPS = 300
-_MOST_STATES = 24
+_MOST_STATES, _MOST_BRANCHES = 24, 6
 _MOST_BITS = 600
 
 
@@ -424,6 +444,15 @@ _STATES = (
     # of other signs, with angles beyond the first period
     ("-4", "-7/2", "9/2", "-2/7", "6/7", "-3/7"),
 )
+# at poles, on planes, slow and fast
+_MORE_STATES = (
+    ("1", "1/2", "1/3", "12/13", "0", "5/13"),
+    ("1/10", "-1/20", "1/7", "-24/25", "7/25", "0"),
+    ("2", "0", "-3", "0", "40/41", "-9/41"),
+    ("-1/3", "1/2", "0", "9/41", "0", "-40/41"),
+    ("20", "-30", "10", "0", "3/5", "4/5"),
+    ("0", "1/40", "1/50", "-20/29", "-21/29", "0"),
+)
 # the number of states on the conditions, where a file gives none
 _ENOUGH = 3
 _BITS = 192
@@ -484,8 +513,8 @@ class UserIntegral(FileClaim):
 
     def _states(self, conditions: Sequence[sympy.Expr], parameters: Mapping[sympy.Symbol, Fraction]) -> list[Point]:
         """The states of the file, else fixed states, or states on the conditions where none of these lies there."""
-        states = _numbers(self._table.states or _STATES)
-        if self._table.states is not None:
+        states = _numbers([*(self._table.states or _STATES), *(_MORE_STATES if self.is_searched else ())])
+        if self._table.states is not None and not self.is_searched:
             return states
         needs = needs_of([self.value, *self.where])
 
@@ -493,9 +522,12 @@ class UserIntegral(FileClaim):
             point = {**parameters, **state}
             return all(is_exactly_zero(c, point) for c in conditions) and all(need.is_met(point) for need in needs)
 
-        if any(map(is_valid, states)):
+        if any(map(is_valid, states)) and not (self.is_searched and conditions):
             return states
-        samples = [*islice(filter(is_valid, states_on([*conditions, OFF_SPHERE], STATE, parameters)), _ENOUGH)]
+        # where a product is 0 one of its factors is
+        branches = islice(product(*map(sympy.Mul.make_args, conditions)), _MOST_BRANCHES)
+        proposed = (states_on([*branch, OFF_SPHERE], STATE, parameters) for branch in branches)
+        samples = [state for of_branch in proposed for state in islice(filter(is_valid, of_branch), _ENOUGH)]
         return samples or states
 
     def statements(self, system: System) -> list[Statement]:
