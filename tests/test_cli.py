@@ -252,7 +252,9 @@ def test_reference_of_the_gyrostat_uses_its_closed_form() -> None:
         ({}, ["--digits", "many"], 2, "--digits"),
         ({"times": "inf"}, [], 2, "not a finite number"),
         ({"gamma": "1,1,1"}, [], 2, "--normalize"),
-        ({"times": "1e6"}, [], 3, "digit"),
+        ({"times": "1e6"}, [], 3, "cannot prove a digit at t = 1e+06"),
+        ({}, ["--effort", "1e-9"], 3, "or a larger --effort of reference"),
+        ({"times": "300"}, ["--effort", "1e-3", "--derivatives", "start"], 3, "or a larger --effort of reference"),
         ({"weight": "1" * 5000}, [], 3, "cannot prove a digit at t = 8"),
     ],
 )

@@ -15,7 +15,7 @@ from heavytop.api.integrators import case_document, check_integrator, listing, n
 from heavytop.api.pages import page
 from heavytop.cases import CASES, case
 from heavytop.cli import app
-from heavytop.errors import HeavyTopError
+from heavytop.errors import HeavyTopError, options_named
 from heavytop.features.score.api import read_trajectory, scored
 from support.helpers import DATA
 
@@ -199,7 +199,8 @@ def test_events_are_the_same_or_the_same_error(function: str) -> None:
     printed = outcome(lambda: of_command("reference", given | {"events": function, "digits": "20"}))
     top, start, options = body_and_start(given)
     direction, until = int(options.get("event-direction", 0)), max(options["times"], key=lambda text: abs(float(text)))
-    known = outcome(lambda: ht.events(top, start, until, function, direction, digits=20))
+    with options_named({"until": "the last of times", "direction": "event_direction"}):
+        known = outcome(lambda: ht.events(top, start, until, function, direction, digits=20))
     if isinstance(known, tuple):
         assert printed == known
     else:

@@ -184,7 +184,7 @@ def exact(value: Any) -> Fraction:
         return exact(value[()])
     if isinstance(value, float | Decimal) or (kind != "bool" and hasattr(value, "as_integer_ratio")):
         raise InputError(f"{quoted(value)} is not a finite number.", _REMEDY)
-    raise InputError(f"A {kind} is not a number: {quoted(value)}.", _REMEDY)
+    raise InputError(f"{quoted(value)} is not a number.", _REMEDY)
 
 
 def _from_quad(value: Any) -> Fraction:
@@ -595,7 +595,7 @@ MOST_MEMBERS = 10_000_000
 
 def vector(values: Iterable[Any], what: str) -> Vector:
     """Three exact rationals of components that :func:`exact` reads; raises InputError otherwise."""
-    parts = ordered(values, what, "Give three numbers: x,y,z.")
+    parts = ordered(values, what, "Give three numbers, such as (3, 2, 1).")
     if len(parts) != 3:
         raise InputError(f"{argument(what)} must have 3 numbers; got {len(parts)}.", "Give x,y,z.")
     try:

@@ -194,8 +194,16 @@ def test_what_has_no_picture_is_refused(run, known) -> None:
         (lambda: ht.plot.drift(known), "must be a computed motion"),
         (lambda: ht.plot.digits(run, short), "must have the same times"),
         (lambda: ht.plot.error(run, later), "Give the same times"),
+        (lambda: ht.plot.error(run, ht.propagate(FREE, START, TIMES)), "same top and start"),
+        (lambda: ht.plot.digits(run, ht.reference(LAGRANGE, TUMBLING, TIMES, 10)), "same top and start"),
         (lambda: ht.plot.poincare(ht.events(LAGRANGE, START, 1, "omega3 = 7")), "no point"),
-        (lambda: ht.plot.poincare([3]), "start must be events"),
+        (lambda: ht.plot.poincare([3]), r"section must be events; got \[3\]"),
+        (lambda: ht.plot.poincare(None), "section must be a list; got None"),
+        (lambda: ht.plot.poincare(ht.events(LAGRANGE, START, 1, "gamma1"), colours=()), r"a colour; got \(\)"),
+        (lambda: ht.plot.phase(run, colour="nocolour"), "colour must be a colour; got 'nocolour'"),
+        (lambda: ht.plot.sphere(run, colour="nocolour"), "colour must be a colour; got 'nocolour'"),
+        (lambda: ht.plot.power(run), "test must be a test; got heavy_top in double"),
+        (lambda: ht.plot.between([]), r"samples must be errors; got \[\]"),
     ):
         with pytest.raises(InputError, match=match):
             draw()

@@ -156,6 +156,8 @@ def test_the_digits_that_a_refusal_offers_are_not_refused(effort):
         offered = int(refused.value.remedy.split()[1])
         assert 0 < offered < asked
         assert generic.cost(Fraction(60), bits_of(offered)) <= effort
+        named = float(refused.value.cause.split("about ")[1].split()[0])
+        assert effort < named < 1.3 * Validated(top, start).cost(Fraction(60), bits_of(asked)) + 0.2 * effort
         asked = next(n for n in range(offered, asked + 1) if generic.cost(Fraction(60), bits_of(n)) > effort)
 
 

@@ -45,7 +45,7 @@ def test_the_attitude_of_a_slow_permanent_rotation_moves() -> None:
     assert run.matrices()[0, 0] == pytest.approx([math.cos(2), -math.sin(2), 0], abs=1e-14)
 
 
-@pytest.mark.parametrize("scale", [-60, 58])
+@pytest.mark.parametrize("scale", [-60, 51, 58])
 def test_a_power_of_two_of_the_time_changes_no_bit_of_gamma(scale: int) -> None:
     unit = Fraction(2) ** scale
     start = ("1/2", "-1/4", 2)

@@ -13,7 +13,7 @@ from heavytop.integrate.heyoka.engines import GAMMA, OMEGA, PARAMETERS, check, c
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, real
-from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
 from heavytop.top.heavy_top import HeavyTop, State
 
 
@@ -86,6 +86,23 @@ def test_a_part_in_a_million_million_is_found(what: str, message: str) -> None:
     check(engine, HEAVY_TOP, DOUBLE)
 
 
+@pytest.mark.parametrize(
+    ("inertia", "moment"),
+    [
+        ((3, 2, 1.5), (1 / 2, 1 / 3, 1 / 5)),
+        ((3.5, 8, 6), (1 / 4, 1 / 2, 1 / 5)),
+        ((1.5, 8, 1.5), (1 / 3, 1 / 4, 1 / 2)),
+    ],
+)
+def test_a_coefficient_whose_terms_cancel_is_right_to_the_rounding_of_the_terms(inertia, moment) -> None:
+    p, tool = Parameters(inertia, moment, 0), compiled(HEAVY_TOP, DOUBLE)
+    with tool.borrowed() as engine:
+        engine.pars[:] = [*inertia, *moment]
+        check(engine, HEAVY_TOP, DOUBLE, p.mapped(Fraction))
+        with pytest.raises(Contradiction, match="Taylor coefficient 8"):
+            check(Faulty(engine, "coefficient 8"), HEAVY_TOP, DOUBLE, p.mapped(Fraction))
+
+
 @pytest.mark.slow
 def test_a_wrong_field_is_refused_before_its_first_use(monkeypatch: pytest.MonkeyPatch) -> None:
     healthy = engines.expressions
@@ -105,7 +122,7 @@ def test_a_wrong_field_is_refused_before_its_first_use(monkeypatch: pytest.Monke
 def test_code_with_the_numbers_of_a_top_is_checked_with_these_and_computes_the_same_motion() -> None:
     case = CASES["kovalevskaya"]
     given = Problem.of(case.top, case.start, DOUBLE).parameters
-    runs = [propagate(case.top, case.start, [10], DOUBLE, constants=each) for each in (None, given)]
+    runs = [propagate(case.top, case.start, [10], DOUBLE, constants=each) for each in (False, True)]
     assert [run.flags["coefficients"] for run in runs] == ["par", "constants"]
     assert numpy.allclose(runs[0].states[0], runs[1].states[0], rtol=1e-12, atol=1e-14)
     engine = compiled(HEAVY_TOP, DOUBLE, constants=given).engine

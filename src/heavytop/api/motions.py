@@ -327,7 +327,9 @@ def reference(
 def _setups(tops: Sequence[HeavyTop | Body], starts: Sequence[State], form: Precision, system: System) -> list[Setup]:
     """The motions of an ensemble; a single top or start serves all of the others."""
     size = max(len(tops), len(starts))
-    if not tops or not starts or {len(tops), len(starts)} - {1, size}:
+    if not tops or not starts:
+        raise InputError(f"No {'starts' if tops else 'tops'} were given.", "Give at least one.")
+    if {len(tops), len(starts)} - {1, size}:
         remedy = "Give as many of each, or one that all share."
         raise InputError(f"tops and starts must be equally many; got {len(tops)} and {len(starts)}.", remedy)
     setups = []
@@ -375,7 +377,7 @@ def _options(
 _NEAR_STEPS = 1e11
 """A run of fewer expected steps is in reach without looking closer."""
 _LARGEST = float(LARGEST)
-_SLOWEST, _FASTEST = 2.0**-94, 2.0**106
+_SLOWEST, _FASTEST = 2.0**-94, 2.0**76
 """Squares of rates well within those of :func:`heavytop.integrate.heyoka.motions.unit_of`."""
 _SLACK = float(arguments.slack_of(DOUBLE))
 

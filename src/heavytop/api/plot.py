@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +36,7 @@ from heavytop.errors import InputError, quoted, refusal
 from heavytop.files import writable
 from heavytop.integrate.trajectory import Trajectory
 from heavytop.measure.scorer import Logs, sample_drifts, sample_errors
-from heavytop.precision import exact
+from heavytop.precision import exact, ordered
 from heavytop.report.document.document import integral_text
 from heavytop.report.document.svg import COLOURS, decades, new_figure
 from heavytop.top.bodies import Body
@@ -106,7 +106,7 @@ def sphere(
         InputError: for fewer than two samples, states that are not finite, and a reference without attitude.
     """
     name, _, path = path_in_space(run, of, top)
-    drawn = _solid(axes)
+    drawn = _solid(axes, colour)
     _globe(drawn)
     _visible_path(drawn, path, colour, label)
     body = name == "vertical"
@@ -137,7 +137,7 @@ def polhode(
         InputError: as :func:`sphere`.
     """
     omega = principal(run, samples(run).omega)
-    drawn = _solid(axes)
+    drawn = _solid(axes, colour)
     free = _free(run, top)
     if free is not None:
         inertia = np.array([float(value) for value in free.inertia])
@@ -191,7 +191,7 @@ def herpolhode(
         momentum = rows[0] @ (own if turn is None else turn @ own)
         if (size := np.linalg.norm(momentum)) > 0:
             across = _plane_across(momentum / size)
-    drawn = _flat(axes)
+    drawn = _flat(axes, colour)
     x, y = (omega @ across.T).T
     drawn.plot(x, y, color=colour, lw=_WIDTH, label=label)
     drawn.plot(x[:1], y[:1], "o", color=colour, ms=4)
@@ -224,7 +224,7 @@ def phase(
         InputError: for another name, and as :func:`sphere`.
     """
     curves = samples(run)
-    drawn = _flat(axes)
+    drawn = _flat(axes, colour)
     values = [_column(curves, name) for name in (x, y)]
     drawn.plot(*values, color=colour, lw=_WIDTH, label=label)
     drawn.plot(*(value[:1] for value in values), "o", color=colour, ms=4)
@@ -255,21 +255,20 @@ def poincare(
         InputError: for another name, and for a section without a point.
     """
     if isinstance(section, PoincareSection):
-        listed: list[Crossings] = list(section.events)
-    else:
-        listed = [section] if isinstance(section, Crossings) else list(section)
-    for start in listed:
-        if not isinstance(start, Crossings):
-            raise refusal("start", "events", quoted(start), "Give the result of heavytop.poincare or heavytop.events.")
+        section = section.events
+    listed = _several(
+        section, Crossings, "section", "events", "Give the result of heavytop.poincare or heavytop.events."
+    )
+    palette = ordered(colours, "colours", _COLOURS) or [()]
     total = sum(map(len, listed))
     if not total:
         raise InputError("The section has no points.", "Give a later until, or another function.")
-    drawn = _flat(axes)
+    drawn = _flat(axes, *palette)
     diameter = size if size is not None else float(np.clip(90 / np.sqrt(total), 2, 5))
     columns = [component(name) for name in (x, y)]
     for index, start in enumerate(listed):
         points = start.to_numpy()[:, columns]
-        drawn.plot(*points.T, ".", color=colours[index % len(colours)], ms=diameter, mew=0)
+        drawn.plot(*points.T, ".", color=palette[index % len(palette)], ms=diameter, mew=0)
     drawn.set(xlabel=_named(x), ylabel=_named(y))
     drawn.set_title(f"section {listed[0].function}", fontsize="medium")
     return drawn
@@ -319,7 +318,7 @@ def digits(
     format_digits = problem.precision.bits * np.log10(2)
     logs = sample_errors(problem, times, states, truth)["relative"]
     right = [format_digits if log is None else float(np.clip(-log, 0, format_digits)) for log in logs]
-    drawn, instants = _flat(axes), np.array([float(time) for time in times])
+    drawn, instants = _flat(axes, colour), np.array([float(time) for time in times])
     drawn.plot(abs(instants), right, color=colour, lw=_WIDTH, label=label)
     drawn.set_title(f"{problem.precision.name}, {run.integrator}", fontsize="medium")
     _time_axis(drawn, instants)
@@ -378,7 +377,7 @@ def animate(
     file = None if path is None else arguments.path(path, "path")
     writer = None if file is None else _writer(file.suffix.lower(), rate or 1)
     name, locus, line = path_in_space(run, "axis3" if of == "vertical" else of, top)
-    rows, drawn = locus.rotations(), _solid(None)
+    rows, drawn = locus.rotations(), _solid(None, colour)
     _globe(drawn)
     drawn.set(xlabel="x", ylabel="y", zlabel="z, up")
     arms = [drawn.plot([], [], [], color=COLOURS[i + 1], lw=2.2, label=f"axis {i + 1}")[0] for i in range(3)]
@@ -422,8 +421,28 @@ def _writer(suffix: str, fps: int) -> AbstractMovieWriter:
     return FFMpegWriter(fps=fps)
 
 
-def _flat(axes: Axes | None) -> Axes:
+def _several(values: Any, kind: Any, what: str, rule: str, remedy: str) -> list[Any]:
+    """One object of type ``kind``, or several, at least one, as a list."""
+    listed = [values] if isinstance(values, kind) else ordered(values, what, remedy)
+    if not listed or not all(isinstance(value, kind) for value in listed):
+        raise refusal(what, rule, quoted(values), remedy)
+    return listed
+
+
+_COLOURS = 'Give one that matplotlib knows, such as "C0" or "#d55e00".'
+
+
+def _require_colours(colours: Sequence[Any]) -> None:
+    from matplotlib.colors import is_color_like
+
+    for colour in colours:
+        if colour is not None and not is_color_like(colour):
+            raise refusal("colour", "a colour", quoted(colour), _COLOURS)
+
+
+def _flat(axes: Axes | None, *colours: Any) -> Axes:
     """The given plane axes, or new ones."""
+    _require_colours(colours)
     if axes is None:
         axes = new_figure(6.4, 4.0).add_subplot()
     elif not hasattr(axes, "plot") or getattr(axes, "name", "") == "3d":
@@ -435,8 +454,9 @@ def _flat(axes: Axes | None) -> Axes:
     return axes
 
 
-def _solid(axes: Axes3D | None) -> Axes3D:
+def _solid(axes: Axes3D | None, *colours: Any) -> Axes3D:
     """The given three-dimensional axes, or new ones."""
+    _require_colours(colours)
     if axes is None:
         axes = new_figure(5.2, 5.0).add_subplot(projection="3d")
     elif getattr(axes, "name", "") != "3d":
@@ -585,6 +605,8 @@ def power(test: PowerCurves, axes: Axes | None = None) -> Axes:
     Returns:
         The axes, with logarithmic errors.
     """
+    if not isinstance(test, PowerCurves):
+        raise refusal("test", "a test", quoted(test), "Give the result of heavytop.power.")
     drawn = _flat(axes)
     times = np.array([float(time) for time in test.times])
     for index, fault in enumerate(test.faults):
@@ -607,9 +629,9 @@ def between(samples: SpacedErrors | Sequence[SpacedErrors], axes: Axes | None = 
     Returns:
         The axes, both logarithmic.
     """
-    several = samples if isinstance(samples, Sequence) else [samples]
+    several = _several(samples, SpacedErrors, "samples", "errors", "Give the result of heavytop.between_samples.")
     drawn, rows = _flat(axes), sorted(several, key=lambda row: row.spacing)
-    for colour, name in zip(COLOURS, rows[0].errors if rows else (), strict=False):
+    for colour, name in zip(COLOURS, rows[0].errors, strict=False):
         points = [(float(row.spacing), error) for row in rows if (error := row.errors[name])]
         if points:
             drawn.plot(*zip(*points, strict=True), "o-", color=colour, lw=_WIDTH, ms=3, label=name)

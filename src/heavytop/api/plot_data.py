@@ -11,14 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heavytop.api.motions import propagate
+from heavytop.arguments import slack_of
 from heavytop.errors import InputError, quoted, refusal
 from heavytop.integrate.frames import framed
 from heavytop.integrate.trajectory import Problem, Trajectory
 from heavytop.measure.reference import Reference
-from heavytop.precision import exact
+from heavytop.precision import Vector, exact
 from heavytop.top.attitude import perpendicular, rotated, transposed
 from heavytop.top.equations import Parameters
-from heavytop.top.heavy_top import HeavyTop
+from heavytop.top.heavy_top import HeavyTop, State
 
 Motion = Trajectory | Reference
 """A computed motion (:func:`heavytop.propagate`) or a known one (:func:`heavytop.reference`)."""
@@ -57,6 +58,7 @@ class FaultCurve(Protocol):
     def errors(self) -> NDArray[np.float64]: ...
 
 
+@runtime_checkable
 class PowerCurves(Protocol):
     """A test with its planted faults, as from :func:`heavytop.power`."""
 
@@ -68,6 +70,7 @@ class PowerCurves(Protocol):
     def faults(self) -> Sequence[FaultCurve]: ...
 
 
+@runtime_checkable
 class SpacedErrors(Protocol):
     """Errors between samples, as from :func:`heavytop.between_samples`."""
 
@@ -155,11 +158,22 @@ def parameters_of(run: Motion, top: HeavyTop | None) -> Parameters:
         return run.problem.parameters
     if not isinstance(top, HeavyTop):
         raise InputError("A reference does not contain its top.", "Give top=.")
-    if run.mass is None and run.inertia and run.weight and run.centre:
-        own = (*run.inertia, run.weight, *run.centre, *(run.rotor or ()))
-        if [*map(exact, own)] != [*top.inertia, top.weight, *top.centre, *(top.rotor or ())]:
-            raise InputError("top is another than that of the reference.", "Give the one of heavytop.reference.")
+    if (own := _vectors(run)) and own[:3] != _vectors(top):
+        raise InputError("top is another than that of the reference.", "Give the one of heavytop.reference.")
     return Parameters(top.inertia, top.moment, top.rotor or 0)
+
+
+def _vectors(of: Motion | HeavyTop) -> list[Vector]:
+    """I, P r and the rotor of a top; of a motion Ω and γ at t = 0 as well, or none, where they are not known."""
+    if isinstance(of, HeavyTop):
+        return [of.inertia, of.moment, of.rotor or (Fraction(0),) * 3]
+    if isinstance(of, Trajectory):
+        top, start = of.problem.given or (of.problem.top, of.problem.start)
+    elif of.mass is None and of.inertia and of.weight and of.centre and of.omega and of.gamma:
+        top, start = HeavyTop(of.inertia, of.weight, of.centre, of.rotor), State(of.omega, of.gamma)
+    else:
+        return []
+    return [*_vectors(top), start.omega, start.gamma]
 
 
 def direction(run: Motion, of: str | None, top: HeavyTop | None) -> tuple[str, NDArray[np.float64]]:
@@ -193,7 +207,7 @@ def path_in_space(run: Any, of: str | None, top: HeavyTop | None) -> tuple[str, 
 
 
 def compared(run: Any, known: Any) -> tuple[Problem, list[Fraction], list[list[Fraction]], list[list[Fraction]]]:
-    """(problem, times, states, known states), exact, of a subset of many; raises InputError if the times differ."""
+    """(problem, times, states, known states), exact, of a subset of many; raises InputError where these differ."""
     if not isinstance(run, Trajectory):
         raise refusal("run", "a computed motion", quoted(run), "Give the result of heavytop.propagate.")
     samples(run)
@@ -201,6 +215,11 @@ def compared(run: Any, known: Any) -> tuple[Problem, list[Fraction], list[list[F
     count = len(run.states)
     if count != len(known.states):
         raise InputError(f"Both runs must have the same times; got {count} and {len(known.states)}.", "Change one.")
+    for one, two in zip(_vectors(run), _vectors(known), strict=False):
+        if max(abs(a - b) for a, b in zip(one, two, strict=True)) > slack_of(run.problem.precision) * max(
+            map(abs, one)
+        ):
+            raise InputError("Both runs must be of the same top and start.", "Change one.")
     indices = every(count)
     times = [exact(run.times[index]) for index in indices]
     slack = 4 * run.problem.precision.eps

@@ -83,7 +83,7 @@ def _given(help: str, *name: str, kind: Any = str, **more: Any) -> Any:
     return Annotated[kind if kind is bool else kind | None, typer.Option(*name, help=help, **more)]
 
 
-_TIMES = Annotated[str, typer.Option(help="Times t1,t2,..., increasing or decreasing from 0; the first may be 0.")]
+_TIMES = Annotated[str, typer.Option(help="Times t1,t2,...; of `propagate` increasing or decreasing from 0.")]
 _DATA = {
     "inertia": _given("Principal moments A,B,C at the fixed point; with --mass 3, 6 (11,22,33,12,13,23) or 9 numbers."),
     "weight": _given("Weight P."),

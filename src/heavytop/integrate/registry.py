@@ -659,7 +659,7 @@ def require_reach(
     if steps > MOST_STEPS:
         raise OutOfReach(
             f"A run to t = {six_digits(end)} takes about 1e{math.floor(log10(Fraction(steps)) or 0.0)} steps.",
-            f"At most {MOST_STEPS:.0e} are supported: give an earlier time, or use `heavytop reference`.",
+            f"At most {MOST_STEPS:.0e} are supported: give an earlier time.",
         )
 
 

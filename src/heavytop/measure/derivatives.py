@@ -80,7 +80,7 @@ def which_derivatives(value: object) -> str | None:
     """ "start", "data", "all", or None for none; raises InputError for any other."""
     if value is None or (isinstance(value, str) and value in WHICH):
         return value
-    raise refusal("derivatives", '"start", "data" or "all"', quoted(value), "Give one of these, or None.")
+    raise refusal("derivatives", '"start", "data" or "all"', quoted(value), "Give one of these, or leave it out.")
 
 
 def known_derivatives(

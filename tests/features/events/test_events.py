@@ -359,7 +359,7 @@ def test_a_run_that_ends_early_says_so() -> None:
 @pytest.mark.parametrize(
     ("changes", "match"),
     [
-        ({"until": 0}, "until must not be 0"),
+        ({"until": 0}, "until must be a time other than 0; got 0"),
         ({"until": "nan"}, "not a finite number"),
         ({"until": "1e151"}, "too large"),
         ({"direction": 2}, "direction must be a sign; got 2"),

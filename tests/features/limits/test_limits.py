@@ -115,7 +115,7 @@ def test_what_changes_nothing_is_not_planted_and_what_is_unknown_is_refused() ->
         (lambda: ht.between_samples(TOP, START, 1, 2), "at most until"),
         (lambda: ht.between_samples(TOP, START, 1, "1/10", 0), "between 1e-12 and 1"),
         (lambda: ht.between_samples(TOP, START, 1, "1e-6"), "At most 20000 intervals"),
-        (lambda: ht.digits_end(TOP, START, 0), "until must not be 0"),
+        (lambda: ht.digits_end(TOP, START, 0), "until must be a time other than 0; got 0"),
     ):
         with pytest.raises(ht.InputError, match=words):
             call()
@@ -128,6 +128,8 @@ def test_a_tolerance_as_printed_detects_the_fault() -> None:
 
 
 def test_a_test_of_hours_is_refused_with_an_end_in_reach() -> None:
+    with pytest.raises(ht.OutOfReach, match="take about 1e"):
+        ht.digits_end(TOP, START, 1e9)
     with pytest.raises(ht.OutOfReach, match=r"up to t = 1e.09 takes about .* steps") as caught:
         ht.power(*LAGRANGE, 10**9, "1e-3")
     earlier = caught.value.remedy.removesuffix(".").split()[-1]

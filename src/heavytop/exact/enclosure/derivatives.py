@@ -34,7 +34,15 @@ from flint import arb, fmpq, fmpq_series, fmpz, fmpz_mat
 from gmpy2 import mpq, mpz
 
 from heavytop.errors import Contradiction, OutOfReach
-from heavytop.exact.enclosure.run import EnclosureRun, ScaledMotion, Validated, own_parameters, seconds_a_step
+from heavytop.exact.enclosure.run import (
+    MOST_EFFORT,
+    EnclosureRun,
+    ScaledMotion,
+    Validated,
+    larger_effort,
+    own_parameters,
+    seconds_a_step,
+)
 from heavytop.exact.enclosure.step import (
     Matrix,
     Node,
@@ -397,14 +405,15 @@ def _one_way(
     """The derivatives at ``spans`` > 0, in increasing order, in one direction."""
     motion = known.motion(direction)
     time = direction * spans[-1]
-    loss, steps = known.forecast(time, bits)
+    loss, steps = known.forecast(time, bits, most=MOST_EFFORT)
     bits_of_motion = bits + loss + _GUARD + _OF_DATA * data + int(min(loss, _FEW * bits) / 4)
     bits_of_columns = bits + _OF_COLUMNS + 0.9 * min(loss, _MOST_OF_COLUMNS)
     for _ in range(_ATTEMPTS):
         columns = steps * (7 + len(DATA) * data)
         of_columns = motion.precision(bits_of_columns, columns)
         planned = max(motion.precision(bits_of_motion, steps), of_columns)
-        if not motion.seconds(planned, loss, steps) + columns * seconds_a_step(*of_columns) < known.effort:
+        seconds = motion.seconds(planned, loss, steps) + columns * seconds_a_step(*of_columns)
+        if not seconds < known.effort:
             break
         tangent = _tangent(known, motion, *of_columns, data)
         start = start_node(motion.field, motion.scaled.state, planned[0])
@@ -421,9 +430,10 @@ def _one_way(
         else:
             return enclosed
         bits_of_motion, bits_of_columns = (before[0] + lacking + _GUARD // 2 for before in (planned, of_columns))
+    within, more = larger_effort(known.effort, seconds)
     raise OutOfReach(
-        f"Validated integration cannot prove so many digits of the derivatives at t = {six_digits(time)}.",
-        "Request fewer digits, or an earlier time.",
+        f"Validated integration cannot prove so many digits of the derivatives at t = {six_digits(time)}{within}.",
+        f"Request fewer digits, or an earlier time{more}.",
     )
 
 

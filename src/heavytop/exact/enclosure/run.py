@@ -30,7 +30,7 @@ from typing import ClassVar, NamedTuple
 from flint import arb, arb_series
 from gmpy2 import mpq
 
-from heavytop.errors import Contradiction, OutOfReach
+from heavytop.errors import Contradiction, OutOfReach, argument
 from heavytop.exact.closed_form import solved
 from heavytop.exact.enclosure.step import (
     Matrix,
@@ -380,6 +380,8 @@ _LARGEST_RATE = 2**100
 _ATTEMPTS = 6
 EFFORT = 900.0
 """Seconds of the cost model that a request for an enclosure may take."""
+MOST_EFFORT = 1e7
+"""The largest effort that a caller may give."""
 
 
 def seconds_a_step(precision: int, in_words: bool) -> float:
@@ -484,7 +486,7 @@ class Validated:
         loss, steps = self.forecast(time, bits)
         planned = motion.precision(bits + loss, steps)
         if motion.seconds(planned, loss, steps) > self.effort:
-            raise self._refusal(time, self._reachable(time, bits, loss, self.start.flat))
+            raise self._refusal(time, bits, loss, self.start.flat)
         run = self._run(direction, self.start.flat, *planned)
         return motion, _steps_of(run, span)
 
@@ -547,7 +549,7 @@ class Validated:
         for _ in range(_ATTEMPTS):
             planned = motion.precision(bits + loss, steps)
             if motion.seconds(planned, loss, steps) > self.effort:
-                raise self._refusal(time, self._reachable(time, bits, loss, start))
+                raise self._refusal(time, bits, loss, start)
             run = run or self._run(direction, start, *planned)
             taken = run.at(span)
             if taken is not None:
@@ -559,7 +561,7 @@ class Validated:
             else:
                 loss = run.precision * (1.25 * float(min(span / run.lost_at, FAR)) if run.lost_at else 2.0)
             run = None
-        raise self._refusal(time, 0)
+        raise self._refusal(time, 0, inf, start)
 
     def forecast(
         self, time: Fraction, bits: int, start: tuple[Fraction, ...] | None = None, most: float | None = None
@@ -590,22 +592,26 @@ class Validated:
             self._pilots.setdefault(key, Pilot(run, Ahead(run.nodes[0])))
         return self._pilots[key]
 
-    def _reachable(self, time: Fraction, bits: int, loss: float, start: tuple[Fraction, ...]) -> int:
-        """A number of bits below ``bits`` within the effort."""
+    def _refusal(self, time: Fraction, bits: int, loss: float, start: tuple[Fraction, ...]) -> OutOfReach:
+        """The refusal of ``bits`` bits, with digits that are within the effort, or an effort that suffices."""
+        seconds = _SURELY * max(self.effort, self.cost(time, bits, MOST_EFFORT, start, loss))
         reachable = bits * 15 // 16
         while reachable > 0 and self.cost(time, reachable, start=start, loss=loss) > self.effort:
             reachable = reachable * 15 // 16
-        return reachable
+        digits = int((reachable - 5) * log10(2))  # rounded up they take up to 5 bits more
+        within, more = larger_effort(self.effort, seconds)
+        what = "so many digits" if digits > 0 or within else "a digit"
+        remedy = f"About {digits} digits could be proven there: request fewer, or" if digits > 0 else "Give"
+        cause = f"Validated integration cannot prove {what} at t = {six_digits(time)}{within}. {self.level}"
+        return OutOfReach(cause.strip(), f"{remedy} an earlier time{more}.")
 
-    def _refusal(self, time: Fraction, reachable: int) -> OutOfReach:
-        at, digits = six_digits(time), int((reachable - 5) * log10(2))  # rounded up they take up to 5 bits more
-        if digits < 1:
-            cause = f"Validated integration cannot prove a digit at t = {at}. {self.level}"
-            return OutOfReach(cause.strip(), "Give an earlier time.")
-        return OutOfReach(
-            f"Validated integration cannot prove so many digits at t = {at}. {self.level}".strip(),
-            f"About {digits} digits could be proven there: request fewer, or an earlier time.",
-        )
+
+def larger_effort(effort: float, seconds: float) -> tuple[str, str]:
+    """The ends of cause and remedy of a refusal by the cost: empty where no effort suffices."""
+    if not effort <= seconds <= MOST_EFFORT:
+        return "", ""
+    cost = f" in {effort:.6g} s: they take about {seconds:.2g} s by the model of its cost"
+    return cost, f", or a larger {argument('effort')} of reference"
 
 
 def _steps_of(run: EnclosureRun, span: Fraction) -> Iterator[Step]:

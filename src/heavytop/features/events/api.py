@@ -248,7 +248,7 @@ def _as_float(value: Fraction) -> float:
 def _until(value: Number) -> Fraction:
     end = physical(value, "until")
     if end == 0:
-        raise InputError("until must not be 0.", "Give a time of either sign.")
+        raise refusal("until", "a time other than 0", 0, "Give a time of either sign.")
     return end
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple
 
 import typer
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, options_named
 
 Functions = Annotated[
     list[str] | None,
@@ -28,6 +28,7 @@ class EventOptions(NamedTuple):
     events: Functions = None
     event_direction: Direction = 0
 
+    @options_named({"direction": "--event-direction"})
     def require(self) -> str:
         """Raises InputError for an invalid function or direction."""
         from heavytop.features.events.api import require_direction
@@ -40,6 +41,7 @@ class EventOptions(NamedTuple):
             event_function(text)
         return "events" if self.events else ""
 
+    @options_named({"until": "the last of --times"})
     def measure(self, top: Any, start: Any, until: Any, **settings: Any) -> Any:
         """The events of each function.  settings: of :func:`heavytop.events`."""
         from heavytop.features.events.api import events

@@ -24,7 +24,7 @@ _MOST_SECONDS = 10**7
 _BUDGET = 'Give a number of motions, "5000", or seconds, "60s".'
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Hunt:
     """The result of a hunt; prints as `heavytop hunt` does.
 
@@ -41,7 +41,7 @@ class Hunt:
     hunted: Hunted
     again: str
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         return hunt_text(self.hunted, self.found, self.again)
 
     def document(self) -> dict[str, Any]:

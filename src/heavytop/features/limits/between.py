@@ -13,7 +13,7 @@ import numpy
 from heavytop import arguments
 from heavytop.arguments import Number
 from heavytop.display import Tabular, TitledTable
-from heavytop.errors import InputError, refusal
+from heavytop.errors import InputError, argument, refusal
 from heavytop.integrate.frames import Setup
 from heavytop.integrate.registry import propagator
 from heavytop.precision import Array, exact_text, physical, six_digits
@@ -92,7 +92,8 @@ def between_samples(
     about, end, step = arguments.system(system, body), physical(until, "until"), physical(spacing, "between")
     target = None if within is None else float(physical(within, "within"))
     if not 0 < step <= end:
-        raise refusal("spacing", "above 0 and at most until", spacing, "Give, for example, until/100.")
+        rule = f"above 0 and at most {argument('until')}"
+        raise refusal("spacing", rule, spacing, f"Give, for example, {six_digits(abs(end) / 100)}.")
     if target is not None and not 1e-12 < target < 1:
         raise refusal("within", "between 1e-12 and 1", within, "Give, for example, 1e-6.")
     count = int(-(-end // step))

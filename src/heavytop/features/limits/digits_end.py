@@ -17,13 +17,14 @@ from typing import Any
 from heavytop import arguments
 from heavytop.arguments import Number
 from heavytop.display import Tabular, TitledTable
-from heavytop.errors import InputError, OutOfReach
+from heavytop.errors import InputError, OutOfReach, refusal
 from heavytop.exact.catalogue import find
 from heavytop.exact.flint.balls import midpoint, radius, whole_evaluation, working_precision
 from heavytop.exact.solution import ExactSolution
 from heavytop.integrate.frames import Setup
-from heavytop.integrate.registry import propagator
+from heavytop.integrate.registry import expected_steps, propagator
 from heavytop.integrate.trajectory import Problem
+from heavytop.measure.truth import seconds_a_step
 from heavytop.precision import DOUBLE, Precision, exact, exact_text, physical, real, rounded, six_digits
 from heavytop.top.bodies import Body
 from heavytop.top.equations import GYROSTAT, System
@@ -32,6 +33,8 @@ from heavytop.top.heavy_top import HeavyTop, State
 _TIMES, _EACH = 64, 4
 """The number of times; the state is rounded at every fourth."""
 _SPARE_BITS = 32
+_RUNS, _MOST_SECONDS = 9, 3600
+"""As long as the whole way takes at most: the motion itself, and half of it for each of 16 roundings."""
 _ALL = 0.5
 """The relative error from which on no digit is correct."""
 
@@ -120,16 +123,24 @@ def digits_end(
 
     Raises:
         InputError: for an invalid motion or time, and for the gyrostat of the paper.
+        OutOfReach: for more than an hour.
     """
     form = arguments.precision(precision)
     body, state = arguments.motion(top, start, form)
     about, end = arguments.system(system, body), physical(until, "until")
     if not end:
-        raise InputError("until must not be 0; got 0.", "Give a time of either sign.")
+        raise refusal("until", "a time other than 0", 0, "Give a time of either sign.")
     if about is GYROSTAT:
         raise InputError("digits_end does not support the system gyrostat.", "Use heavy_gyrostat, with a rotor.")
     setup = Setup.of(body, state, form, about)
     problem = Problem.of(setup.top, setup.start, form, about)
+    seconds = _RUNS * expected_steps(problem, end) * seconds_a_step(2 * form.bits + _SPARE_BITS)
+    if seconds > _MOST_SECONDS:
+        earlier = float(end) * _MOST_SECONDS / seconds
+        raise OutOfReach(
+            f"The digits up to t = {six_digits(end)} take about {seconds:.1g} s.",
+            f"At most {_MOST_SECONDS} s are supported: give an end up to about {earlier:.2g}.",
+        )
     times = tuple(end * k / _TIMES for k in range(_TIMES + 1))
     errors = _errors(problem, times)
     worst = [

@@ -6,7 +6,7 @@ from typing import Annotated, Any, NamedTuple
 
 import typer
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, options_named
 
 Ends = Annotated[
     bool,
@@ -37,6 +37,7 @@ class LimitOptions(NamedTuple):
             raise InputError("--within was given without --between.", "Give --between DT too.")
         return "limits" if self.digits_end or self.between is not None else ""
 
+    @options_named({"until": "the last of --times", "spacing": "--between", "within": "--within"})
     def measure(self, top: Any, start: Any, until: Any, **settings: Any) -> Any:
         """The measurements that the options request."""
         from rich.text import Text

@@ -45,7 +45,7 @@ _SHORT, _FEW = 0.97, 100
 """The part of the way to a sample that is taken in steps of the mean length, where more than so many steps are left."""
 _GROWTH = 16
 """At most so many times the steps so far are taken at once: few steps say little about the longest."""
-_SLOWEST, _FASTEST, _SLOW, _FAST = Fraction(1, 2**48), Fraction(2) ** 55, 2.0**-46, 2.0**52
+_SLOWEST, _FASTEST, _SLOW, _FAST = Fraction(1, 2**48), Fraction(2) ** 40, 2.0**-46, 2.0**38
 """Rates between which no Taylor coefficient leaves the exponent range of double."""
 
 
@@ -201,7 +201,7 @@ def propagate(
     tolerance: Fraction | None = None,
     high_accuracy: bool = False,
     compact_mode: bool | None = None,
-    constants: Parameters | None = None,
+    constants: bool = False,
 ) -> Trajectory:
     """The motion from ``start`` at t = 0, at ``times``, computed by heyoka in ``precision``.
 
@@ -212,7 +212,8 @@ def propagate(
     stepping: how steps are taken; another class than heyoka's own has a planted fault.
     place: the resume point of an earlier run of the same problem; the run continues after it, to the same bits.
     mark: called after each sample with the resume point there.
-    tolerance, high_accuracy, compact_mode, constants: as in :func:`heavytop.integrate.heyoka.engines.compiled`.
+    tolerance, high_accuracy, compact_mode: as in :func:`heavytop.integrate.heyoka.engines.compiled`.
+    constants: compile the parameters into the code.
 
     Raises InputError for times out of order, a format that the platform lacks, data outside its exponent range, a
     start that the system does not admit, and a resume point of other flags.  A failed run is an outcome, not an
@@ -227,7 +228,7 @@ def propagate(
         tolerance=tolerance,
         high_accuracy=high_accuracy,
         compact_mode=compact_mode,
-        constants=constants,
+        constants=in_unit(problem, unit_of(problem)).parameters if constants else None,
     )
     engine = tool.take()
     try:
@@ -253,7 +254,7 @@ def integrate_to_samples(
 ) -> Trajectory:
     """The motion of ``problem`` at ``targets``, native numbers in order, computed by ``engine``, one of ``tool``'s."""
     unit = unit_of(problem)
-    if unit != 1 and place is None and len(engine.pars):  # constants compiled in have the unit given
+    if unit != 1 and place is None:
         scaled, factor = in_unit(problem, unit), number(unit, problem.precision)
         unscaled = observer and (lambda time, state: observer(time / unit, _from_unit(state, unit)))
         run = integrate_to_samples(

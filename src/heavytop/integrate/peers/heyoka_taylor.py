@@ -26,7 +26,7 @@ def constants(problem: Problem, times: Sequence[Fraction], tolerance: Fraction |
         system=problem.system,
         xi=problem.xi,
         tolerance=tolerance,
-        constants=problem.parameters,
+        constants=True,
     )
     return replace(run, integrator="heyoka:constants")
 
