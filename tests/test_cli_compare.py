@@ -190,8 +190,12 @@ def test_a_history_shows_what_changed_or_what_is_asked_for(reports, heavytop, ca
     assert "break_away_time" in Path("h.html").read_text()
     assert heavytop("history", "old", "same") == 0
     assert "Nothing changed. --metric" in capsys.readouterr().out
-    assert heavytop("history", "old", "same", "--case", "none") == 0
-    assert "Nothing changed, or nothing matches." in capsys.readouterr().out
+    assert heavytop("history", "old", "same", "--metric", "seconds *") == 0
+    assert "Nothing changed. --metric" in capsys.readouterr().out
+    for option, text, known in (("case", "eulr", "euler"), ("metric", "drift_enrgy_max", "drift_energy_max")):
+        assert heavytop("history", "old", "same", f"--{option}", text) == 2
+        said = f"No {option} of the reports matches '{text}'.\n  Did you mean {known}? They have "
+        assert said in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -240,6 +240,11 @@ def six_digits(value: Fraction) -> str:
     return f"{float(text):.6g}" if 1e-300 < abs(float(text)) < 1e300 else text
 
 
+def two_digits(value: Fraction) -> str:
+    """A size for a sentence, such as an error: ``1.8e-11``."""
+    return decimal_text(value, 2).lower()
+
+
 _MOST_DISTINCT = 40
 """Digits of a number in a sentence, beyond which the difference is written instead."""
 

@@ -142,6 +142,7 @@ def test_what_no_row_can_see_the_check_of_the_contract_names(fault: str, monkeyp
         ("dies at the fourth request", "unknown lines", "violated", "rk4 ended with exit code 1 before it said done"),
         ("begins otherwise", "two processes", "violated", "A new process answers otherwise than one in use"),
         ("other each time", "two processes", "note", "Not tested: one process answers equal requests with different"),
+        ("six digits", "restart", "kept", "A restart at t = 1 changes the state at t = 2 by "),
         ("has small steps", "between steps", "kept", "Samples between steps are as accurate as the ends of runs."),
     ],
 )

@@ -234,6 +234,10 @@ def linear(field, t0, y0, t1, y1, at):
     return (1 - s) * y0 + s * y1
 
 
+def nearest(field, t0, y0, t1, y1, at):
+    return y0 if at - t0 < t1 - at else y1
+
+
 def cubic(field, t0, y0, t1, y1, at):
     h, s = t1 - t0, (at - t0) / (t1 - t0)
     f0, f1 = (np.array(field(y.tolist())) for y in (y0, y1))
@@ -244,6 +248,7 @@ def cubic(field, t0, y0, t1, y1, at):
     ("between", "order", "beyond", "verdict"),
     [
         (linear, 5, 0, "violated"),
+        (nearest, 5, 0, "violated"),
         (linear, 2, 0, "note"),
         (cubic, 5, 0, "note"),
         (linear, 0, 0, "note"),
@@ -256,6 +261,7 @@ def test_what_lies_between_steps_is_tried_beside_the_order(between, order, beyon
     peer = double_peer("dense", order, dopri(between, beyond))
     found = judged(of_callable(peer), "between steps")
     assert (found.verdict, "between steps" in found.text) == (verdict, True)
+    assert ("as for the nearest or the previous state" in found.text) == (between is nearest)
 
 
 def test_a_tolerance_that_changes_nothing_is_said() -> None:
@@ -284,7 +290,7 @@ def test_a_method_that_is_exact_on_a_motion_counts_no_step_too_few() -> None:
     found = row(of_callable(exactly), "work_precision", times, table, step="1/10")
     assert found.outcome == "success", found.reference.reason
     assert found.explained.kind == "steps"
-    assert "it is exact on this motion, or takes more steps than it counts" in found.explained.text
+    assert "it is exact on this motion, or it takes more steps than it counts" in found.explained.text
 
 
 def test_a_step_that_underflows_is_a_note_that_says_what_was_asked(tmp_path: Path) -> None:

@@ -91,7 +91,7 @@ def test_a_moment_of_inertia_and_a_component_of_the_centre_are_named(axis: int) 
 def test_a_factor_of_all_terms_is_named() -> None:
     assert "the weight P is 1.001 times what it should be" in said(moment=[1.001 * value for value in MOMENT])
     near_one = said(moment=[(1 + 3e-8) * value for value in MOMENT])
-    assert "the weight P is 1 + 3E-8 times what it should be" in near_one
+    assert "the weight P is 1 + 3e-8 times what it should be" in near_one
     assert "the length of each step is 1.001 times" in said(factors=numpy.full(len(TERMS), 1.001))
     assert "γ' is 1.001 times" in said(factors=numpy.array([1.0] * 12 + [1.001] * 6))
 

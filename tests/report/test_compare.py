@@ -11,7 +11,7 @@ from heavytop.errors import InputError
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
 from heavytop.records import Against, Data, Law, Metric, Quantity, Row, Series
-from heavytop.report.compare.noise import Policy, Rule, Timings
+from heavytop.report.compare.noise import Policy, Rule, Timings, load
 from heavytop.report.compare.verdicts import judge_seconds
 from support.reports import compare, replace, store
 from support.small_reports import all_judged, error, judged, report, row, verdicts
@@ -203,6 +203,9 @@ def test_missing_and_new_rows_and_metrics() -> None:
 
 
 def test_seconds_may_change_by_their_ratio_and_below_their_floor() -> None:
+    starter = load(Path(ht.__file__).parent / "api/starters/common/policy.toml").timings
+    for old, new, verdict in ((0.36e-3, 2.6e-3, "worse"), (0.14e-3, 0.94e-3, "same"), (0.7e-3, 1.3e-3, "same")):
+        assert judge_seconds(old, new, starter)[0].value == verdict
     for old, new, verdict in (
         *((1, 1.49, "same"), (1, 1.51, "worse"), (1.5, 1.01, "same"), (1.5, 0.99, "better")),
         *((0.001, 0.149, "same"), (0.001, 0.151, "worse")),

@@ -138,6 +138,10 @@ def test_a_step_of_an_integrator_of_others_is_said_with_its_order(orders: str, w
     theirs = row(measure="local_error", integrator="mine:rk4", metrics=metrics, order=4)
     sentence = " ".join(line.strip() for line in said(row(measure="local_error", metrics=metrics), theirs)[1:])
     assert sentence == f"euler mine:rk4 in double: one step errs by at most {words}"
+    coarse = row(
+        case="coarse", measure="local_error", integrator="mine:rk4", metrics={"local_error_ulp_max": error("1e9")}
+    )
+    assert summary(theirs, coarse)[0].startswith("euler") == ("not the declared" in words)
 
 
 def test_escapes_in_one_format_stand_by_integrator() -> None:

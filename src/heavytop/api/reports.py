@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -15,13 +16,13 @@ from heavytop import arguments, records
 from heavytop.api.run_folder import prepare
 from heavytop.arguments import Number
 from heavytop.display import Tabular, TitledTable, plural, printable
-from heavytop.errors import InputError, quoted, refusal
+from heavytop.errors import InputError, meant, quoted, refusal
 from heavytop.features.kinds import KINDS
 from heavytop.measure.scalar import digits_kept
 from heavytop.precision import as_integer, ordered
 from heavytop.report.compare import compare as comparing
 from heavytop.report.compare import noise as policies
-from heavytop.report.document.document import row_name, short
+from heavytop.report.document.document import clip, row_name, short
 from heavytop.report.render import export as exports
 from heavytop.report.render import history as over
 from heavytop.report.render.comparison import headline, metric_name, values
@@ -306,7 +307,7 @@ def history(
         A :class:`History`.
 
     Raises:
-        InputError: for fewer than two reports, and for an invalid report or policy.
+        InputError: for fewer than two reports, an invalid report or policy, and a pattern that matches nothing.
     """
     return read_history(reports, metric, case, policy, lambda: None)
 
@@ -324,8 +325,21 @@ def read_history(reports: Any, metric: str, case: str, policy: PathLike | None, 
         names.append(f"report {number}" if ready else str(arguments.path(source, "reports")))
         report.append(_report(source, "reports", read))
     tracks = over.history(report, rules, KINDS)
-    tracks = [t for t in tracks if cases.fullmatch(t.row.case) and metrics.fullmatch(t.metric)]
-    return History(names, [track for track in tracks if metric or track.steps], report)
+    matching = [t for t in tracks if cases.fullmatch(t.row.case) and metrics.fullmatch(t.metric)]
+    if not matching:
+        _require_match(cases, "case", case, {row.case for source in report for row in source.rows})
+        of_cases = {track.metric for track in tracks if cases.fullmatch(track.row.case)}
+        _require_match(metrics, "metric", metric, of_cases | {"seconds run", "seconds least"})
+    return History(names, [track for track in matching if metric or track.steps], report)
+
+
+def _require_match(pattern: re.Pattern[str], what: str, text: str, known: set[str]) -> None:
+    """Raise InputError if none of the known names matches; ``""`` is that of a whole row."""
+    if not any(map(pattern.fullmatch, known)):
+        listed = clip(", ".join(sorted(known - {""})), 300)
+        raise InputError(
+            f"No {what} of the reports matches {quoted(text)}.", f"{meant(text, known)}They have {listed}."
+        )
 
 
 def _report(source: Any, what: str, read: Callable[[], None]) -> store.AnyReport:

@@ -101,8 +101,7 @@ def history(
     if json:
         print_json(history_of_reports.to_json())
     else:
-        selected = bool(metric) or case != "*"
-        show_on_terminal(history_text(history_of_reports.names, history_of_reports.tracks, selected=selected))
+        show_on_terminal(history_text(history_of_reports.names, history_of_reports.tracks))
     return ExitCode.GOOD
 
 

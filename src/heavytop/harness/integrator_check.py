@@ -347,7 +347,9 @@ class _Contract:
         if gap > _ERROR_MULTIPLE * error:
             raise _Violated(f"{differ}, {float(gap / error if error else gap):.2g} times the error without it.")
         if self.declared.one_step and registry.control_name(self.which) == "step":
-            raise _Note(f"{differ}, which the error explains. A multistep method should declare one_step = false.")
+            with suppress(_Violated):  # few digits explain it as well
+                self._digits()
+                raise _Note(f"{differ}, which the error explains. A multistep method should declare one_step = false.")
         return f"{differ}, which the error explains."
 
     def _error(self, run: Trajectory) -> Fraction:
@@ -429,7 +431,8 @@ class _Contract:
         text = f"{errors}: between steps it falls like the power {power:.1f} of the step size"
         low = power < min(_LEAST_DENSE_ORDER, fine.order - _ORDER_MARGIN)
         if low and (power > _LINEAR_ORDER or not as_at_ends):
-            raise _Violated(f"{text}, as for linear interpolation, and the order is {fine.order}.")
+            how = "linear interpolation" if power > _LINEAR_ORDER else "the nearest or the previous state"
+            raise _Violated(f"{text}, as for {how}, and the order is {fine.order}.")
         if as_at_ends:
             return kept
         raise _Note(f"{text if falls else errors}.")

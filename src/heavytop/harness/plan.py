@@ -459,6 +459,8 @@ def positive(texts: list[str], what: str) -> list[Fraction]:
     """Exact numbers; raises InputError unless they are positive and grow."""
     values = [physical(text, what) for text in texts]
     if not values or values != sorted(set(values)) or values[0] <= 0:
+        if len(texts) == 1:
+            raise refusal(what, "positive", texts[0], "Give a number above 0.")
         raise refusal(what, "positive and increasing", ", ".join(texts) or "nothing", "Give each number once.")
     return values
 

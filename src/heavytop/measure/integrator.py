@@ -26,7 +26,7 @@ from heavytop.measure.running import TimeText
 from heavytop.measure.scalar import RELATIVE, UNRESOLVED, of_fraction
 from heavytop.measure.scorer import SOLUTION_ERROR, Scorer
 from heavytop.measure.truth import EnsembleReference
-from heavytop.precision import Array, decimal_text, exact, six_digits
+from heavytop.precision import Array, decimal_text, exact, six_digits, two_digits
 from heavytop.records import UNRESOLVED_SECONDS, Law, Metric, Quantity, Series
 from heavytop.top.heavy_top import State
 
@@ -173,8 +173,8 @@ def _require_near(name: str, run: Trajectory, judged: Trajectory, most: Fraction
     _require_success(name, run, what, count)
     if most is not None and (off := _distance(run, judged)) > most:
         raise PeerFailed(
-            f"{name}, {what}, ends {decimal_text(off, 2)} away from its run with {count} times, of which its error "
-            f"explains up to {decimal_text(most, 2)}: the seconds are those of another run"
+            f"{name}, {what}, ends {two_digits(off)} away from its run with {count} times, of which its error "
+            f"explains up to {two_digits(most)}: the seconds are those of another run"
         )
 
 
@@ -230,7 +230,8 @@ def doubtful_counts(run: Trajectory, error: Fraction | None) -> str:
     """A sentence if the counts of a run do not explain how small its ``error`` is, else "".
 
     A step of a method of order p through an angle θ has a relative error of about (θ/(4 (p + 1)))^(p + 1).  This does
-    not refute a count: a method may be exact on a motion, and a step may need no evaluation of the field.
+    not refute a count: the order may be declared too low, a method may be exact on a motion, and a step may need no
+    evaluation of the field.
     """
     if NOT_COUNTED.items() <= run.flags.items() or not run.steps:
         return ""
@@ -245,8 +246,8 @@ def doubtful_counts(run: Trajectory, error: Fraction | None) -> str:
         return ""
     return (
         f"It counts {run.steps} steps of {angle:.2g} rad: of order {run.order} they would be off by more than "
-        f"{bound:.1g}, and it is off by {decimal_text(error, 2)}: it is exact on this motion, or takes more steps than "
-        "it counts."
+        f"{bound:.1g}, and it is off by {two_digits(error)}: its order is higher than declared, it is "
+        "exact on this motion, or it takes more steps than it counts."
     )
 
 

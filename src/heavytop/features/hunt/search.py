@@ -285,15 +285,15 @@ class HuntRequest:
 
     def __post_init__(self) -> None:
         rules = {
-            "family": (self.family, self.family in FAMILIES, f"one of {', '.join(FAMILIES)}"),
-            "horizon": (self.horizon, self.horizon != 0, "a time other than 0"),
-            "budget": (self.budget, self.budget is None or 1 <= self.budget <= _MOST, f"from 1 to {_MOST} motions"),
-            "limit": (self.limit, self.limit is None or self.limit > 0, "positive"),
-            "seed": (self.seed, 0 <= self.seed <= _MOST_SEED, f"from 0 to {_MOST_SEED}"),
+            "family": (self.family, self.family in FAMILIES, f"one of {', '.join(FAMILIES)}", "any"),
+            "horizon": (self.horizon, self.horizon != 0, "a time other than 0", 100),
+            "budget": (self.budget, self.budget is None or 1 <= self.budget <= _MOST, f"1 to {_MOST} motions", 1000),
+            "limit": (self.limit, self.limit is None or self.limit > 0, "positive", 100),
+            "seed": (self.seed, 0 <= self.seed <= _MOST_SEED, f"from 0 to {_MOST_SEED}", 1),
         }
-        for name, (value, holds, rule) in rules.items():
+        for name, (value, holds, rule, example) in rules.items():
             if not holds:
-                raise refusal(name, rule, value, f"Correct {name}.")
+                raise refusal(name, rule, value, f"Give, for example, {example}.")
         if self.integrator.name == HEYOKA and self.precision == DOUBLE_DOUBLE:
             raise InputError("heyoka does not support double-double.", "Use multiword, or another format.")
         if self.against == self.integrator:

@@ -22,8 +22,9 @@ import numpy
 from heavytop.extras import has_extra, install
 from heavytop.features.local_error.measurement import Call
 from heavytop.integrate.trajectory import Problem
-from heavytop.precision import Array, decimal_text, exact, plain_decimal
+from heavytop.precision import Array, decimal_text, exact, plain_decimal, two_digits
 from heavytop.records import Explained
+from heavytop.report.document.document import short
 from heavytop.top.equations import NAMES, Parameters, System
 
 _DROP, _ALIKE = 100.0, 30.0
@@ -203,7 +204,7 @@ def field_fault(problem: Problem, calls: Sequence[Call], order: int) -> Explaine
         named_fits = [(factor, *_rounded(steps, factor, s, left)) for factor, s, left in fits if left <= _ALIKE * best]
     least = min(map(_plainness, named_fits))
     said = dict.fromkeys(_said(fit[0], fit[1]) for fit in named_fits if _plainness(fit) == least)
-    fall = f"the largest error of a step falls from {error:.1e} to {best:.1e}"
+    fall = f"the largest error of a step falls from {short(f'{error:.1e}', 2)} to {short(f'{best:.1e}', 2)}"
     return Explained("field", f"Single steps fit another field: {', or '.join(said)}; {fall}.")
 
 
@@ -227,5 +228,5 @@ def _said(factor: _Factor, number: Fraction) -> str:
     if number == -1:
         return f"{factor.text} has the opposite sign"
     near = abs(number - 1) < _NEAR_ONE
-    times = f"1 {'+' if number > 1 else '-'} {decimal_text(abs(number - 1), 2)}" if near else plain_decimal(number, 8)
+    times = f"1 {'+' if number > 1 else '-'} {two_digits(abs(number - 1))}" if near else plain_decimal(number, 8)
     return f"{factor.text} is {times} times what it should be"

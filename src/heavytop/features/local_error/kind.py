@@ -109,7 +109,7 @@ class LocalErrorKind(Kind):
         """
         shown = _told(rows)
         if shown:
-            yield Headline(_said(max(shown, key=_size)))
+            yield Headline(_said(max(shown, key=lambda row: (_is_below_order(row), _size(row)))))
         yield from (Note(_said(row), shown=In.SHORT) for row in shown)
         columns = "case", "format", "steps", "largest", "rms", "order observed", "of runs", "declared", "outcome"
         yield Cells("Single steps", columns, [_cells(row) for row in rows], _NOTES, shown=In.FULL | In.PAGE)
@@ -162,6 +162,12 @@ def _told(rows: Sequence[Row]) -> list[Row]:
     """The rows with an error; those of third-party integrators alone where there are any."""
     theirs = [row for row in rows if row.key.subject.name != HEYOKA]
     return [row for row in theirs or rows if any(_number(row, metric) for metric in (_LARGEST, ERROR.text))]
+
+
+def _is_below_order(row: Row) -> bool:
+    """Whether whole runs show a lower order than the declared one."""
+    order = row.metrics.get(ORDER_OF_RUNS.text)
+    return bool(order and row.order and float(order) < row.order)
 
 
 def _size(row: Row) -> float:

@@ -31,7 +31,7 @@ from heavytop.integrate.trajectory import Outcome, Problem, TaylorStep, Trajecto
 from heavytop.measure.running import RunningStatistics, Sums
 from heavytop.measure.scalar import GUARD_BITS, largest, metric, resolved, to_ball
 from heavytop.measure.scorer import OBSERVED_ORDER
-from heavytop.precision import Precision, decimal_text, exact, rounded, six_digits
+from heavytop.precision import Precision, exact, rounded, six_digits, two_digits
 from heavytop.records import Metric, Quantity, by_name
 from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -224,8 +224,8 @@ def unexplained(whole: Trajectory, length: Fraction, step: Fraction, amplificati
     if off <= most:
         return ""
     return (
-        f"Its run to t = {six_digits(until)} is off by {decimal_text(off, 2)}, which {round(count)} steps, each "
-        f"off by {decimal_text(step, 2)} at most where it starts anew, do not explain: it keeps a memory "
+        f"Its run to t = {six_digits(until)} is off by {two_digits(off)}, which {round(count)} steps, each "
+        f"off by {two_digits(step)} at most where it starts anew, do not explain: it keeps a memory "
         "(one_step = false), errs more elsewhere, or takes fewer steps than it counts."
     )
 

@@ -93,12 +93,11 @@ def history_json(names: Sequence[str], tracks: Sequence[Track]) -> dict[str, obj
     }
 
 
-def history_text(names: Sequence[str], tracks: Sequence[Track], *, selected: bool = False) -> RenderableType:
-    """A table with one column per report, steps marked; selected: of the metrics or cases that match a pattern."""
+def history_text(names: Sequence[str], tracks: Sequence[Track]) -> RenderableType:
+    """A table with one column per report, steps marked."""
     heads = [Text(printable(f"{number}  {name}")) for number, name in enumerate(names, 1)]
     if not tracks:
-        nothing = "Nothing changed, or nothing matches." if selected else "Nothing changed."
-        return Group(*heads, Text(f"\n{nothing} --metric '*' shows what did not change too.", style="bold"))
+        return Group(*heads, Text("\nNothing changed. --metric '*' shows what did not change too.", style="bold"))
     numbers = [str(number) for number in range(1, len(names) + 1)]
     shown = Lines(["row", "metric", *numbers], list(map(cells, tracks)), words=2)
     return Group(*heads, Text(_LEGEND, style="dim"), Text(), shown)
