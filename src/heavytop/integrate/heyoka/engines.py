@@ -45,7 +45,7 @@ XI = (1, 2, -5)
 _ROTOR = (6, -12, 18)
 _MOST_DERIVATIVES = 100
 _COEFFICIENT_EPS, _GROWTH_AN_ORDER = 8, Fraction(5, 4)
-"""Rounding of the first coefficient, and its growth: up to 35 eps of the terms of coefficient 20, of 5,000 tops."""
+"""Rounding of the first coefficient, and its growth: up to 35 eps of the terms of coefficient 20, of 1,500 tops."""
 _SUM_EPS = 4
 _STEP_ERROR = 1e-12
 Exact = int | Fraction

@@ -77,7 +77,6 @@ _NOTATIONS = (
 """Usual notations, and what a file has in their place."""
 _LONGEST_HINT = 200
 _MAX_LENGTH = 10_000
-_MAX_LENGTH = 10_000
 _MAX_NODES = 2_000
 _MAX_BITS = 4_096
 _MAX_EXPONENT = 64
