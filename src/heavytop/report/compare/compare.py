@@ -139,7 +139,7 @@ def compare(
         + _differences(baseline.environment, candidate.environment),
         rows.same,
         [
-            *sentences(changes, same, rows.failed, rows.unsupported, rows.moved),
+            *sentences(changes, same, rows),
             *(motion.sentence for motion in joined if motion.sentence),
             *rows.limits.remarks,
         ],

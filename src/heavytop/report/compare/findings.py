@@ -20,7 +20,7 @@ from heavytop.integrate.registry import is_third_party
 from heavytop.measure.scalar import digits_kept, digits_text
 from heavytop.measure.scorer import DRIFT, ERRORS, OBSERVED_ORDER, ORDER_OF_RUNS, SOLUTION_ERROR
 from heavytop.records import FAILED, NOT_ASKED, UNMEASURED, UNSUPPORTED, Identity, Law, Metric, Quantity, Row, Series
-from heavytop.report.compare.rows import Finding
+from heavytop.report.compare.rows import Finding, RowComparison
 from heavytop.report.compare.verdicts import Verdict
 from heavytop.report.document.document import clip, integral_text, short
 
@@ -38,6 +38,8 @@ _ENDS_AS_BEFORE = 0.5
 """Decades by which the error of the last state may grow where only the dense output is worse."""
 _STEPS_MOVED = 0.02
 """Decades: different roundings in step size control change the steps by less."""
+_STEPS_SAID = 0.005
+"""Least change of steps, as a fraction, that is said where no metric is beyond its limit."""
 _LEAST_LOSS = math.log10(1.1)
 """Decades: a smaller loss is no loss of order, where only the limit of a policy makes an error worse."""
 _LESS = 0.5
@@ -257,19 +259,18 @@ class Sentence(NamedTuple):
     rows: frozenset[Identity]
 
 
-def sentences(
-    changes: Changes, same: int, failed: Sequence[Row] = (), unsupported: int = 0, moved: bool = False
-) -> list[str]:
+def sentences(changes: Changes, same: int, compared: RowComparison) -> list[str]:
     """At most eight sentences, the most important first; losses before gains.
 
     same: the number of unchanged metrics, where a row without metrics in both reports counts as one.
-    failed: rows that failed in both reports, in the same way.  unsupported: the number of rows so in both.
-    moved: whether any of these metrics is not equal.
     """
+    failed, unsupported = compared.failed, compared.unsupported
     if not changes.rows:
         counted = same - unsupported - sum(row.outcome in UNMEASURED for row in failed)
         numbers = f"Nothing changed: {plural(counted, 'metric is', 'metrics are')} within the limits."
-        numbers = f"No metric of {counted} changed beyond its limit." if moved else numbers
+        if compared.moved:
+            steps = f"; steps changed by up to {compared.steps:.0%}" if compared.steps >= _STEPS_SAID else ""
+            numbers = f"No metric of {counted} changed beyond its limit{steps}."
         nothing = f"Nothing is compared: {plural(unsupported, 'row is', 'rows are')} not supported in either report."
         said = [numbers] if counted else [nothing] if unsupported else []
         return [*said, *_still_failed(failed), *_yardstick(changes)]

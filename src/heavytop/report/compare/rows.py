@@ -354,7 +354,8 @@ class RowComparison:
     timed: whether seconds are compared; repeated: whether those of repeated runs are.
     list_same: False to count unchanged metrics in :attr:`same` instead of listing them.
     failed: rows of the candidate that failed in both reports, in the same way.  unsupported: the number of rows that
-    are not supported in both.  moved: whether any metric of a row is not equal.
+    are not supported in both.  moved: whether any metric of a row is not equal.  steps: the largest
+    relative change of the steps of a row.
     checked: of the baseline and of the candidate, whether each row was already checked on reading.
     """
 
@@ -368,6 +369,7 @@ class RowComparison:
     failed: list[Row] = field(default_factory=list, init=False)
     unsupported: int = field(default=0, init=False)
     moved: bool = field(default=False, init=False)
+    steps: float = field(default=0.0, init=False)
 
     def __post_init__(self) -> None:
         self.limits = Lookup(self.policy)
@@ -378,6 +380,7 @@ class RowComparison:
         self.failed += later.failed
         self.unsupported += later.unsupported
         self.moved |= later.moved
+        self.steps = max(self.steps, later.steps)
         self.limits.hidden |= later.limits.hidden
         self.limits.unused = {i: rule for i, rule in self.limits.unused.items() if i in later.limits.unused}
 
@@ -398,6 +401,8 @@ class RowComparison:
         if new.outcome != SUCCESS and not ignored:
             self.failed.append(new)
         self.moved = self.moved or old.metrics != new.metrics
+        if old.steps != new.steps and not ignored:
+            self.steps = max(self.steps, abs(new.steps / old.steps - 1))
         findings = self._metrics(pair)
         if old.laws or new.laws:
             findings += self._laws(pair)
