@@ -219,7 +219,7 @@ DOUBTED = {
     "one_step": ("changed(steps=lambda found: 1)", "It counts 1 steps of "),
     "few_steps": (
         "changed(steps=lambda found: max(1, found.steps // 30), order=lambda found: 8)",
-        "or takes more steps than it counts.",
+        "or it takes more steps than it counts.",
     ),
     "few_evaluations": ("changed(evaluations=lambda found: 1)", " steps, and 1 evaluations of the field."),
 }

@@ -25,6 +25,7 @@ from heavytop.harness.rows import Task, computed, measure
 from heavytop.integrate import registry
 from heavytop.integrate.peers.command import Command, close_all
 from heavytop.integrate.peers.double import Solved, double_peer
+from heavytop.integrate.peers.runge_kutta import Tableau
 from heavytop.integrate.registry import of_callable
 from heavytop.precision import DOUBLE
 from heavytop.records import Row, RowKey
@@ -287,10 +288,16 @@ def test_a_method_that_is_exact_on_a_motion_counts_no_step_too_few() -> None:
         return replace(run, order=1, steps=20, flags={})
 
     table, times = WorkPrecisionTable([], "2", []), tuple(Fraction(i, 5) for i in range(1, 11))
-    found = row(of_callable(exactly), "work_precision", times, table, step="1/10")
-    assert found.outcome == "success", found.reference.reason
-    assert found.explained.kind == "steps"
-    assert "it is exact on this motion, or it takes more steps than it counts" in found.explained.text
+    half = Fraction(1, 2)
+    rk4 = Tableau(1, ((half,), (0, half), (0, 0, 1)), [Fraction(i, 6) for i in (1, 2, 2, 1)]).peer("mine:rk4")
+    for integrator, causes in (
+        (exactly, ", it is exact on this motion, or it takes more steps than it counts"),
+        (rk4, ""),
+    ):
+        found = row(of_callable(integrator), "work_precision", times, table, step="1/10")
+        assert found.outcome == "success", found.reference.reason
+        assert found.explained.kind == "steps"
+        assert found.explained.text.endswith(f": its order is higher than declared{causes}.")
 
 
 def test_a_step_that_underflows_is_a_note_that_says_what_was_asked(tmp_path: Path) -> None:

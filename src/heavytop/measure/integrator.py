@@ -226,8 +226,10 @@ def require_counts(name: str, run: Trajectory, control: tuple[str, Fraction] | N
         )
 
 
-def doubtful_counts(run: Trajectory, error: Fraction | None) -> str:
+def doubtful_counts(run: Trajectory, error: Fraction | None, coarse: Callable[[], Fraction | None]) -> str:
     """A sentence if the counts of a run do not explain how small its ``error`` is, else "".
+
+    coarse: the error in steps twice as long, which shows whether the order is higher than declared; None if unknown.
 
     A step of a method of order p through an angle θ has a relative error of about (θ/(4 (p + 1)))^(p + 1).  This does
     not refute a count: the order may be declared too low, a method may be exact on a motion, and a step may need no
@@ -244,10 +246,12 @@ def doubtful_counts(run: Trajectory, error: Fraction | None) -> str:
     bound = min(1.0, angle / (_ANGLE_OF_ORDER * (run.order + 1))) ** (run.order + 1) * numpy.abs(states).max()
     if error >= exact(float(bound)):
         return ""
+    twice, cause = coarse(), "its order is higher than declared"
+    if not (twice and error and twice > error * 2 ** (run.order + 1)):
+        cause += ", it is exact on this motion, or it takes more steps than it counts"
     return (
         f"It counts {run.steps} steps of {angle:.2g} rad: of order {run.order} they would be off by more than "
-        f"{bound:.1g}, and it is off by {two_digits(error)}: its order is higher than declared, it is "
-        "exact on this motion, or it takes more steps than it counts."
+        f"{bound:.1g}, and it is off by {two_digits(error)}: {cause}."
     )
 
 

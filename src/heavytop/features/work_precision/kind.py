@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import msgspec
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, PeerFailed
 from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.features.work_precision.charts import method_growth, work_precision
 from heavytop.features.work_precision.curves import (
@@ -179,7 +180,7 @@ class WorkPrecision(Kind):
             run = replace(run, outcome=sampled.outcome, time_reached=sampled.time_reached)
         row = computed_row(task, run, by_name(metrics), scorer.series(time_text), scorer.against)
         row = msgspec.structs.replace(row, integrator=task.subject, evaluations=run.evaluations)
-        if done and not task.integrator.own and (text := doubtful_counts(run, error)):
+        if done and not task.integrator.own and (text := doubtful_counts(run, error, partial(_coarse, task, problem))):
             return msgspec.structs.replace(row, explained=Explained("steps", text))
         return with_explanation(row, task, turned or run, scorer)
 
@@ -264,6 +265,18 @@ def _setting(subject: Subject) -> tuple[str, Fraction] | None:
     if FINEST in (subject.tolerance, subject.step):
         return None
     return ("tolerance", exact(subject.tolerance)) if subject.tolerance else ("step", exact(subject.step))
+
+
+def _coarse(task: Task, problem: Problem) -> Fraction | None:
+    """The largest error in steps twice as long; None where no step is set, or the run fails."""
+    case, setting = task.given, _setting(task.key.subject)
+    if setting is None or setting[0] != "step":
+        return None
+    with suppress(PeerFailed):
+        peer = registry.ready(task.integrator, ("step", 2 * setting[1]))
+        run = peer(case.top, case.start, task.times, task.precision, system=case.system)
+        return _error(_scored(task, problem, run)) if run.outcome is Outcome.SUCCESS else None
+    return None
 
 
 def _error(scorer: Scorer) -> Fraction | None:
