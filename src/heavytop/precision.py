@@ -617,10 +617,11 @@ def ordered(values: Any, what: str, remedy: str) -> list[Any]:
     """
     if not isinstance(values, str | bytes | bytearray | Set | Mapping):
         try:
-            if hasattr(values, "__array__"):  # such as a table, which iterates over the names of its columns
+            # a table iterates over the names of its columns, some arrays over scalars of their own
+            if hasattr(values, "__array__") and (hasattr(values, "columns") or _is_foreign(next(iter(values), 0))):
                 import numpy
 
-                values = values if isinstance(values, numpy.ndarray) else numpy.asarray(values)
+                values = numpy.asarray(values)
             members = list(islice(values, MOST_MEMBERS + 1))
             if len(members) > MOST_MEMBERS:
                 raise InputError(f"{what} has more than {MOST_MEMBERS} members.", remedy)
@@ -630,6 +631,14 @@ def ordered(values: Any, what: str, remedy: str) -> list[Any]:
         except Exception:  # not iterable: an array without dimensions, a generator that fails
             pass
     raise refusal(what, "a list", quoted(values), remedy)
+
+
+def _is_foreign(member: Any) -> bool:
+    """Whether a member of an array is neither a number nor a row."""
+    try:
+        return not (isinstance(member, list | tuple) or getattr(member, "shape", None)) and exact(member) is None
+    except InputError:
+        return True
 
 
 def dot(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:

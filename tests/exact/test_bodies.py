@@ -274,6 +274,7 @@ def test_angles_of_many_turns_are_known_at_once(angle: str, place: int) -> None:
         ((1, 3, 1), "centre of mass", "1, 1, 3"),
         *(((0.1, 0.3 + off, 0.2), "centre of mass", None) for off in (-4e-8, 4e-8)),  # a plate in seven digits
         ((0.1, 0.3001, 0.2), "centre of mass", "0.1, 0.2, 0.3001"),
+        ((0.2, 0.2, 0.2, 0.07, 0.07, 0.07), "centre of mass", "0.13, 0.13, 0.34"),
     ],
 )
 def test_a_tensor_that_is_none_about_the_centre_of_mass_is_a_warning(inertia, about, diagonal) -> None:
@@ -284,6 +285,8 @@ def test_a_tensor_that_is_none_about_the_centre_of_mass_is_a_warning(inertia, ab
     (text,) = found
     assert f"about the centre of mass, of principal moments {diagonal}, is not a rigid body's" in text
     assert ("by a tensor about the centre of mass that was read as about the pivot." in text) == (about == "pivot")
+    assert ("by a Steiner term that was subtracted" in text) == (about != "pivot")
+    assert ("Possibly, the products of inertia have the opposite sign" in text) == (0.07 in inertia)
 
 
 def test_what_may_be_0_is_printed_as_0_with_its_radius() -> None:

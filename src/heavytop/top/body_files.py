@@ -6,6 +6,7 @@ Numbers are exact, to the digits in the file.  A rotation of the inertial axes w
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -203,11 +204,11 @@ def _of_links(root: Element, reader: Callable[[str, Element, Element, _Around], 
 
 
 class _Numbers:
-    """Numbers of one element of a file; of each decimal its size and the unit in its last digit."""
+    """Numbers of one element of a file; of each its size, the unit in its last digit, and whether it is a decimal."""
 
     def __init__(self, where: str, if_missing: str = "Give it in the file.") -> None:
         self.where, self.if_missing = where, if_missing
-        self.units: list[tuple[Fraction, Fraction]] = []
+        self.units: list[tuple[Fraction, Fraction, bool]] = []
 
     def read(self, text: str | None, what: str, default: str | None = None) -> list[Fraction]:
         """The numbers of ``text``, separated by spaces or commas."""
@@ -226,8 +227,7 @@ class _Numbers:
         value = exact(text)
         _, _, decimals = text.lower().partition("e")[0].partition(".")
         exponent = int(text.lower().partition("e")[2] or 0)
-        if decimals or exponent < 0:
-            self.units.append((abs(value), Fraction(10) ** (exponent - len(decimals))))
+        self.units.append((abs(value), Fraction(10) ** (exponent - len(decimals)), bool(decimals) or exponent < 0))
         return value
 
     def three(self, text: str | None, what: str, default: str | None = None) -> Vector:
@@ -285,8 +285,9 @@ class _Numbers:
     ) -> tuple[Six, Fraction]:
         """Six numbers, and the slack of their printed digits: an entry of ½ tr J − J collects four halves of a unit.
 
-        Zeros at the end may have been left out, so that the finest number says the unit, but none that is far smaller
-        than the largest; at most a part of that.
+        Zeros at the end may have been left out, so that the finest decimal says the unit, but none that is far smaller
+        than the largest beside one that is not; numbers of up to six digits may be rounded to six (%g of C).  At most a
+        part of the largest.
         products: what the format takes for a product of inertia that is not there.
         """
         self.units = []
@@ -295,8 +296,13 @@ class _Numbers:
             for index, (text, name) in enumerate(zip(texts, what, strict=True))
         )
         largest = max(map(abs, (a, b, c)))
-        units = [unit for size, unit in self.units if not size or size >= _COMPARABLE * largest]
-        return (a, b, c, d, e, f), min(2 * min(units, default=Fraction(0)), _MOST_SLACK * largest)
+        decimals = [(size, unit) for size, unit, is_decimal in self.units if is_decimal]
+        units = [unit for size, unit in decimals if not size or size >= _COMPARABLE * largest]
+        unit = min(units or [unit for _, unit in decimals], default=Fraction(0))
+        if largest and all(size < 10**6 * last for size, last, _ in self.units):
+            exponent = math.floor(math.log10(largest.numerator) - math.log10(largest.denominator))
+            unit = max(unit, Fraction(10) ** (exponent - 5))
+        return (a, b, c, d, e, f), min(2 * unit, _MOST_SLACK * largest)
 
 
 def _rpy(numbers: _Numbers, text: str | None, degrees: bool = False) -> Tensor:
@@ -342,16 +348,25 @@ def _urdf(name: str, link: Element, inertial: Element, around: _Around) -> BodyI
 
 
 def _attached(elements: Sequence[Element], name: str) -> str:
-    """The note on links with a mass that fixed joints attach to a link, directly or one after the other."""
-    links = {link.get("name", "") for link in elements if link.tag == "link" and link.find("inertial") is not None}
+    """The note on links of URDF with a mass that fixed joints attach to one, directly or one after the other."""
+    links = {
+        link.get("name", "")
+        for link in elements
+        if link.tag == "link" and any(_has_mass(mass.get("value", "")) for mass in link.iterfind("inertial/mass"))
+    }
     joints = [
         [*joint.iterfind("parent"), *joint.iterfind("child")] for joint in elements if joint.get("type") == "fixed"
     ]
-    pairs = [[end.get("link") or end.text for end in ends] for ends in joints if len(ends) == 2]
+    pairs = [[end.get("link") for end in ends] for ends in joints if len(ends) == 2]
     held: list[str | None] = [name]
     for parent in held:
         held += {child for above, child in pairs if above == parent} - {*held}
     return _not_included(len(links & {*held[1:]}))
+
+
+def _has_mass(text: str) -> bool:
+    """Whether a number has a digit other than 0."""
+    return bool(re.search("[1-9]", text.lower().partition("e")[0]))
 
 
 def _not_included(count: int) -> str:
@@ -439,8 +454,7 @@ def _sdf(name: str, link: Element, inertial: Element, around: _Around) -> BodyIn
     six, slack = numbers.tensor(texts, _SIX_URDF, products="0")
     mass, frames = numbers.number(inertial.findtext("mass"), "mass"), _SdfFrames(numbers, link, around)
     shape = _shape_of(_shapes(numbers, link, frames.in_link), centre)
-    six, note = _in_axes(axes, six), _attached([*around], link.get("name", ""))
-    return BodyInFile(name, mass, centre, six, slack, *shape, frames.ball(), frames.gravity(), note=note)
+    return BodyInFile(name, mass, centre, _in_axes(axes, six), slack, *shape, frames.ball(), frames.gravity())
 
 
 @dataclass(frozen=True, slots=True)
@@ -623,15 +637,19 @@ def _mjcf_body(name: str, body: Element, parts: _Parts, frames: _MjcfFrames) -> 
     joint = frames.pose(numbers, *balls[0])[1] if balls else None
     shape = _shape_of(frames.shapes(numbers, parts), centre)
     x, y, z = ((1 - numbers.number(body.get("gravcomp"), "gravcomp", "0")) * value for value in frames.gravity)
-    note = _not_included(_welded(parts))
+    note = _not_included(_welded(parts, frames))
     return BodyInFile(name, mass, centre, _in_axes(axes, six), slack, *shape, joint, (x, y, z), note=note)
 
 
-def _welded(parts: _Parts) -> int:
+def _welded(parts: _Parts, frames: _MjcfFrames) -> int:
     """The number of bodies with a mass within a body of MJCF, and within these, that have no joint."""
-    inner = [[*_parts(child)] for child, _ in parts if child.tag == "body"]
-    tags = [({part.tag for part, _ in parts}, parts) for parts in inner]
-    return sum(bool(own & {"inertial", "geom"}) + _welded(of) for own, of in tags if not own & {"joint", "freejoint"})
+    count = 0
+    for own in ([part for part, _ in _parts(child)] for child, _ in parts if child.tag == "body"):
+        if not {part.tag for part in own} & {"joint", "freejoint"}:
+            masses = [frames.attributes(part) for part in own if part.tag in ("inertial", "geom")]
+            count += any(_has_mass(values.get("mass", values.get("density", "1"))) for values in masses)
+            count += _welded([(part, ()) for part in own], frames)
+    return count
 
 
 def _compiled(path: Path) -> Any:

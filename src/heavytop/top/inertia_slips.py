@@ -159,20 +159,21 @@ def is_positive(tensor: Tensor) -> bool:
 
 
 def mending(body: MassProperties) -> str:
-    """The likeliest slip as a sentence with the corrected numbers; empty where none makes the tensor that of a body."""
+    """The slips as sentences with the corrected numbers; empty where none makes the tensor that of a body."""
+    told = []
     for slip in slips(body):
-        if None in slip.inertia or slip.inertia == body.six:
-            return slip.sentence
         numbers = ", ".join(six_digits(value) for value in slip.inertia if value is not None)
-        return f"{slip.sentence} Corrected: inertia = [{numbers}]."
-    return ""
+        is_same = None in slip.inertia or slip.inertia == body.six
+        told += [slip.sentence] if is_same else [f"{slip.sentence} Corrected: inertia = [{numbers}]."]
+    return " ".join(told)
 
 
 def realisable(central: Tensor, slack: Fraction = Fraction(0)) -> bool:
     """Whether a body has this tensor about its centre of mass: positive moments, triangle inequality."""
     six = six_of(central)
-    # a moment that is 0 but for roundings in double, of which a diagonal tensor has none: all mass is on a line
-    floor = _ROUNDINGS * max(map(abs, six)) if any(six[3:]) else Fraction(0)
+    # a moment that is 0 but for roundings, of which a diagonal tensor has none: all mass is on a line
+    largest, products = max(map(abs, six)), max(map(abs, six[3:]))
+    floor = max(_ROUNDINGS * largest, slack * products / largest) if products else Fraction(0)
     return has_second_moments(central, slack) and is_positive(central) and _semidefinite(central, -floor)
 
 
@@ -190,8 +191,15 @@ def slips(body: MassProperties) -> list[Slip]:
         return [slip]
     if not possible:
         mends = [pair for pair in _mends(body) if realisable(pair[1].central, body.slack) and _in_shape(pair[1])]
-        return [slip for slip, _ in sorted(mends, key=lambda pair: _ROUND * _products(pair[1]) > _products(body))]
+        mends.sort(key=lambda pair: _ROUND * _products(pair[1]) > _products(body))
+        return [_possible(slip) if len(mends) > 1 else slip for slip, _ in mends]
     return [*_of_units(body), *_of_products(body)][:3] or [*_beyond_shape(body)]
+
+
+def _possible(slip: Slip) -> Slip:
+    """A slip beside others that mend the tensor as well."""
+    first, rest = slip.sentence[0], slip.sentence[1:]
+    return slip if slip.sentence.startswith("It would") else replace(slip, sentence=f"Possibly, {first.lower()}{rest}")
 
 
 def _rod(body: MassProperties) -> Slip:
@@ -227,8 +235,7 @@ def _mends(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
     sentence = "The products of inertia have the opposite sign: I12 is minus the integral of x y dm."
     if flipped != n:
         yield _mend(body, "signs_of_products", sentence, flipped)
-    # nearly every tensor beyond the triangle inequality is mended by Steiner's term; hardly one with a negative moment
-    if not body.at_pivot and any(body.centre) and not (body.geometry is None and is_positive(body.central)):
+    if not body.at_pivot and any(body.centre):  # which mends nearly every tensor beyond the triangle inequality
         sentence = "It would be explained by a Steiner term that was subtracted from a tensor about the centre of mass."
         yield _mend(body, "about_centre", sentence, six_of(plus(rows(n), steiner(body.mass, body.centre))))
     if negative := sum(value < 0 for value in n[:3]):

@@ -202,10 +202,13 @@ FORMS |= {
         "csv",
         lambda: exported("sec,nsec", [f"17,{k}00000000" for k in range(11)], "orientation.", "angular."),
     ),
-    "seconds beside t": (
-        "csv",
-        lambda: f"{HEAD}t,sec,nsec,qw,qx,qy,qz\n{rows(TIMES, numpy.ones((len(TIMES), 2)), quaternions())}",
-    ),
+    **{
+        f"seconds beside {name}": (
+            "csv",
+            lambda name=name: f"{HEAD}{name},sec,nsec,qw,qx,qy,qz\n{rows(TIMES, numpy.ones((11, 2)), quaternions())}",
+        )
+        for name in ("t", "header.stamp", "timestamp")
+    },
     "rostopic with two stamps": (
         "csv",
         lambda: exported(
@@ -392,10 +395,11 @@ def test_stamps_in_double_say_how_many_digits_of_the_time_they_keep(tmp_path: Pa
         ("timestamp", 9, True),
         ("time", 7, True),
         ("t", 2, False),
-        ("time_ns", 0, False),
+        ("time_ns", 0, True),
+        ("time_ns", -4, False),
     ):
-        scale = 1 if places else 10**9
-        stamps = [f"{1.7e9 * scale + scale * time:.{places}f}" for time in off]
+        scale = 1 if places > 0 else 10**9
+        stamps = [f"{round(1.7e9 * scale + scale * time, places):.{max(places, 0)}f}" for time in off]
         lines = [f"{stamp},{line}" for stamp, line in zip(stamps, rows(quaternions()).splitlines(), strict=True)]
         path.write_text(plain(lines).replace("t,qw", f"{name},qw"))
         shown = heavytop("score", path)
@@ -471,6 +475,7 @@ def test_rows_of_one_time_are_one_where_they_agree_to_the_digits_printed(tmp_pat
         ("t,rpy1,rpy2,rpy3,n", "'rpy1' looks like an attitude"),
         ("t,angular rate 1,angular rate 2,angular rate 3,n", "looks like an angular velocity"),
         ("t,gx,gy,gz,n", "Ω of a gyroscope, or γ"),
+        ("sec,nsec,a,b,c", "have 0.1, 0."),
         ("t,cmd_orientation_w,cmd_orientation_x,cmd_orientation_y,cmd_orientation_z", "not found"),
     ],
 )

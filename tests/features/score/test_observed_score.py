@@ -321,7 +321,10 @@ def test_python_takes_arrays_of_any_kind() -> None:
     assert score.digits_kept > 15
     assert set(score.distance) == {"gamma", "attitude", "position", "position_relative"}
     frame = pandas.DataFrame(quaternions, columns=[*"wxyz"])
-    assert ht.score(motion.times, quaternions=frame, positions=positions, **given).digits_kept == score.digits_kept
+    vector = pytest.importorskip("sympy").Matrix([1, 2, 3])
+    assert ht.State(omega=vector, gamma=(0, 0, 1)) == ht.State(omega=(1, 2, 3), gamma=(0, 0, 1))
+    for table in (frame, frame.to_records(index=False)):
+        assert ht.score(motion.times, quaternions=table, positions=positions, **given).digits_kept == score.digits_kept
     matrices, spins = motion.rotation.astype(float), motion.omega.astype(float)
     whole = ht.score(motion.times, matrices=matrices, omega=spins, require=14, **given)
     assert whole.passed

@@ -557,7 +557,8 @@ def _positions(samples: Observations) -> Iterator[Row]:
 
 def _renamed(samples: Observations) -> Iterator[Row]:
     """Axes of the body or of space in another order or reversed, without a mirror image."""
-    beside = {"position"} < samples.columns.keys() and bool(_forms(samples) & set(FORMS))
+    is_enough = len(samples.times) >= _FEWEST
+    beside = is_enough and {"position"} < samples.columns.keys() and bool(_forms(samples) & set(FORMS))
     for matrix, axes in _rotations():
         if beside:
             mixed = {"mixed": ("position", numpy.array(matrix))}

@@ -165,7 +165,7 @@ def with_one_time(
     log: then the clock began with the computer.
     """
     names = list(names)
-    around = "" if {"t", "time"} & {canonical(name).partition(" ")[0].lower() for name in names} else "stamp."
+    around = "" if {*_COUNTED} & {canonical(name).partition(" ")[0].lower() for name in names} else "stamp."
     stamps = [_STAMP.fullmatch(f"{around}{name.strip()}") for name in names]
     parts = {match[1].lower()[0]: index for index, match in enumerate(stamps) if match}
     if parts.keys() == {"s", "n"}:
@@ -173,6 +173,11 @@ def with_one_time(
         for row in cells:
             integer, nanoseconds = number(row[seconds]), number(row[nano])
             if integer is not None and nanoseconds is not None:
+                if around and (integer.denominator > 1 or 0 < integer == nanoseconds // 10**9):
+                    raise InputError(
+                        f"The columns {names[seconds]}, {names[nano]} have {row[seconds]}, {row[nano]}: two times.",
+                        f"Keep one, as t; or give whole seconds, and in {names[nano]} the nanoseconds since then.",
+                    )
                 row[seconds] = decimal_text(integer + nanoseconds / 10**9, 40)
             del row[nano]
         names = [re.sub(r"^timestamp\b", "epoch", name) for name in names]  # of the log, not of the message
@@ -223,15 +228,16 @@ def _places(word: str, words: Sequence[str], cells: Sequence[Sequence[str]]) -> 
 
 
 def _loss(stamps: Sequence[str]) -> str:
-    """The note on the digits lost to the epoch where all stamps are decimals of doubles; empty where none are."""
+    """The note on the digits lost to the epoch where all stamps are doubles; empty where none are.
+
+    Zeros at the end of all integers show a larger unit.
+    """
     values = [(value, _last_unit(text)) for text in stamps if (value := number(text)) is not None]
     unit, (first, _), (last, _) = min(unit for _, unit in values), values[0], values[-1]
     spacing = Fraction(math.ulp(float(first)))
-    if (
-        min(spacing, Fraction(1)) <= unit
-        or not last > first
-        or any(abs(value - Fraction(float(value))) > unit / 2 for value, _ in values)
-    ):
+    while unit >= 1 and last > first and all(value % (10 * unit) == 0 for value, _ in values):
+        unit *= 10
+    if spacing < unit or not last > first or any(abs(value - Fraction(float(value))) > unit / 2 for value, _ in values):
         return ""
     digits = int(math.log10((last - first) / spacing))
     return f"; as doubles the stamps keep {digits} digits of the time since then: write nanoseconds as integers"
