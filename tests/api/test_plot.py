@@ -90,7 +90,7 @@ def test_phase_planes_and_sections(run) -> None:
         assert (line == points).all()
     assert len({line.get_color() for line in axes.lines}) == 2
     one = ht.events(GENERIC, TUMBLING, 10, "gamma2", digits=15)
-    assert len(lines(ht.plot.poincare(one))[0]) == len(one)
+    assert len(lines(ht.plot.poincare(one, colours="rgb"))[0]) == len(one)
 
 
 def test_the_axis_of_a_run_backwards_is_that_of_the_size_of_its_times() -> None:

@@ -259,7 +259,8 @@ def poincare(
     listed = _several(
         section, Crossings, "section", "events", "Give the result of heavytop.poincare or heavytop.events."
     )
-    palette = ordered(colours, "colours", _COLOURS) or [()]
+    palette = list(colours) if isinstance(colours, str) else ordered(colours, "colours", _COLOURS)
+    palette = palette or [()]
     total = sum(map(len, listed))
     if not total:
         raise InputError("The section has no points.", "Give a later until, or another function.")

@@ -157,6 +157,14 @@ WRONG_KEYS = [
     ({"parameters": {"a": "1"}, "assume": ["a > 0 and a < 2"]}, "each comparison is a text of its own"),
     ({"assume": ["Omega3/Omega3 > 0"]}, "assume: 1 depends on Omega3"),
     ({"top": top(weight="x")}, "Known here: pi; "),
+    *(  # what would be another name or formula in ASCII stays as it is
+        (
+            {"parameters": dict.fromkeys(("Omega3n", "alphabeta", "api", "sqrtab"), "2"), "integral": {"value": text}},
+            re.escape(text),
+        )
+        for text in ("Omega3ⁿ", "αβ", "aπ", "√Omega3^2")
+    ),
+    ({"definitions": {"q": "abs(c)", "abs": "2"}, "parameters": {"c": "2"}, "integral": {"value": "c*x"}}, "'x'"),
     *(
         ({"integral": {"value": text}}, f"Did you mean {re.escape(meant)}\\?")
         for text, meant in {
@@ -195,7 +203,7 @@ def test_a_wrong_key_is_named_in_words(parts, said):
     [
         ("Omega3", "holds"),
         ("Omega1", "refuted"),
-        ("2·Ω₃² − ln(α) + abs(λ×Ω3) + 10^70*ln", "holds"),
+        ("2·Ω₃² − ln(α) + abs(λ×Ω3) + 10^70*ln + √α·√(α + 1)", "holds"),
         ("arctan(Omega3) + arsinh(Omega3) + coth(1 + Omega3^2)", "holds"),
         ("cot(Ω₁)", "refuted"),
     ],

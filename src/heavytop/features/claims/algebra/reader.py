@@ -53,7 +53,7 @@ _SHORT = {
     **dict.fromkeys(("atanh", "artanh", "arctanh"), "log((1 + x)/(1 - x))/2"),
 }
 """Functions of x by their formulas.  A parameter may have the name of one, or of a synonym."""
-_ASCII: dict[str, str] = dict(zip("−·⋅×√≥≤≠", ("-", *"***", "sqrt", ">=", "<=", "!="), strict=True))
+_ASCII = str.maketrans(dict(zip("−·⋅×≥≤≠₀₁₂₃₄₅₆₇₈₉", ("-", *"***", ">=", "<=", "!=", *"0123456789"), strict=True)))
 _CONSTANT = ("top.inertia", "top.centre", "top.weight", "relations", "assume")
 """The formulas that hold neither t nor the state."""
 _VARIABLE = re.compile(r"t|(?:Omega|gamma)[1-3]")
@@ -146,17 +146,24 @@ def _meant(text: str, names: Mapping[str, Formula]) -> str:
 
 
 def plain(text: str) -> str:
-    """A text with ASCII characters for Greek letters, subscripts, exponents and signs: Omega3^(2) for Ω₃²."""
+    """A text with ASCII characters for Greek letters, subscripts, exponents and signs: Omega3^(2) for Ω₃².
+
+    A letter beside another one stays, as a product would become one name; so does the root of a power or function.
+    """
+    if text.isascii():
+        return text
     text = re.sub("[⁰¹²³⁴-⁹⁻]+", lambda power: f"^({unicodedata.normalize('NFKC', power[0])})", text)
-    return text if text.isascii() else "".join(map(_ascii, text))
+    text = re.sub(r"√\s*(\d+(?:\.\d+)?|[^\W\d]\w*)(?!\s*(?:[\w.^([]|\*\*))", r"sqrt(\1)", text.translate(_ASCII))
+    return re.sub(r"(?<![^\W\d_])[^\W\d_](?![^\W\d_])", _ascii, re.sub(r"√\s*(?=\()", "sqrt", text))
 
 
-def _ascii(character: str) -> str:
-    if character in "₀₁₂₃₄₅₆₇₈₉" or character.isalpha():
+def _ascii(match: re.Match[str]) -> str:
+    character = match[0]
+    if not unicodedata.decomposition(character).startswith("<su"):  # an exponent or a subscript
         character = unicodedata.normalize("NFKC", character)
     greek = re.fullmatch(r"GREEK (SMALL|CAPITAL) LETTER (\w+)", unicodedata.name(character[0], ""))
     if greek is None:
-        return _ASCII.get(character, character)
+        return character
     name = str(greek[2]).lower().replace("lamda", "lambda")
     return name if greek[1] == "SMALL" else name.capitalize()
 

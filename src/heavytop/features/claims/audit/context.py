@@ -332,7 +332,7 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     names |= {"pi": symbol(sympy.pi), **{str(variable): symbol(variable) for variable in variables}}
     for name, text in content.definitions.items():
         later = content.definitions.keys() - names.keys() - FUNCTION_NAMES.keys()
-        if used := sorted(later.intersection(re.findall(r"\w+", text))):
+        if used := sorted(later.intersection(re.findall(r"\b\w+\b(?!\s*\()", text))):
             cause = f"The definition of {name} uses {used[0]}, which is not defined before it."
             raise InputError(cause, "Change the order of [definitions].")
         names[name] = parse(text, names, f"definition of {name}")
