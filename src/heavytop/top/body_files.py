@@ -286,8 +286,8 @@ class _Numbers:
         """Six numbers, and the slack of their printed digits: an entry of ½ tr J − J collects four halves of a unit.
 
         Zeros at the end may have been left out, so that the finest decimal says the unit, but none that is far smaller
-        than the largest beside one that is not; numbers of up to six digits may be rounded to six (%g of C).  At most a
-        part of the largest.
+        than the largest beside one that is not; and the largest has no more digits than another, or six (%g of C).  At
+        most a part of the largest.
         products: what the format takes for a product of inertia that is not there.
         """
         self.units = []
@@ -299,9 +299,10 @@ class _Numbers:
         decimals = [(size, unit) for size, unit, is_decimal in self.units if is_decimal]
         units = [unit for size, unit in decimals if not size or size >= _COMPARABLE * largest]
         unit = min(units or [unit for _, unit in decimals], default=Fraction(0))
-        if largest and all(size < 10**6 * last for size, last, _ in self.units):
+        if largest:
+            digits = max(len(str(int(size / last))) for size, last, _ in self.units)
             exponent = math.floor(math.log10(largest.numerator) - math.log10(largest.denominator))
-            unit = max(unit, Fraction(10) ** (exponent - 5))
+            unit = max(unit, Fraction(10) ** (exponent + 1 - max(digits, 6)))
         return (a, b, c, d, e, f), min(2 * unit, _MOST_SLACK * largest)
 
 

@@ -173,7 +173,7 @@ def realisable(central: Tensor, slack: Fraction = Fraction(0)) -> bool:
     six = six_of(central)
     # a moment that is 0 but for roundings, of which a diagonal tensor has none: all mass is on a line
     largest, products = max(map(abs, six)), max(map(abs, six[3:]))
-    floor = max(_ROUNDINGS * largest, slack * products / largest) if products else Fraction(0)
+    floor = max(_ROUNDINGS * largest, min(slack, 2 * slack * products / largest)) if products else Fraction(0)
     return has_second_moments(central, slack) and is_positive(central) and _semidefinite(central, -floor)
 
 

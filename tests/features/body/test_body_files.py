@@ -76,6 +76,7 @@ SLIPS: dict[str, tuple[list[str], str]] = {
     "row_major": (in_order(SIX, (0, 3, 4, 3, 1, 5)), "open"),
     "negative_moment": (["0.31", "-0.28", *SIX[2:]], "mended"),
     "rod": (["0", "0.28", "0.28", "0", "0", "0"], "same"),
+    "rod in three digits": (["0.126", "0.214", "0.338", "0.163", "-0.0147", "0.0112"], "same"),
     "rod turned": (["0.506", "0.526", "0.775", "-0.387", "0.226", "0.22"], "same"),  # smallest moment 0.00044
     "millimetres": ([str(float(value) * 1e6) for value in SIX], "mended"),
 }
@@ -89,7 +90,7 @@ def test_each_slip_is_named_in_each_format(tmp_path: Path, suffix: str, slip: st
         pytest.skip("a TOML file has units of its own")
     code, document = judged(tmp_path / f"a.{suffix}", written(suffix, six))
     assert code == 1
-    assert document["slips"][0]["name"] == {"order_of_slots": "order_urdf", "rod turned": "rod"}.get(slip, slip)
+    assert document["slips"][0]["name"] == {"order_of_slots": "order_urdf"}.get(slip, slip).partition(" ")[0]
     mended = document["slips"][0]["inertia"]
     if mend == "mended":
         assert floats(mended) == pytest.approx(floats(SIX), rel=1e-12)
