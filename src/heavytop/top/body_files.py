@@ -32,7 +32,7 @@ _UTF8_MARK = b"\xef\xbb\xbf"
 _LARGEST_FILE = 50_000_000
 _LARGEST = Fraction(10**30)
 _MOST_SLACK = Fraction(1, 200)
-_COMPARABLE = Fraction(1, 1000)
+_COMPARABLE, _MOST_DIGITS = Fraction(1, 1000), Fraction(10**99)
 _FROM_DOUBLE = Fraction(1, 10**14)
 _ZERO: Vector = (Fraction(0), Fraction(0), Fraction(0))
 EARTH: Vector = (Fraction(0), Fraction(0), Fraction("-9.81"))
@@ -300,7 +300,7 @@ class _Numbers:
         units = [unit for size, unit in decimals if not size or size >= _COMPARABLE * largest]
         unit = min(units or [unit for _, unit in decimals], default=Fraction(0))
         if largest:
-            digits = max(len(str(int(size / last))) for size, last, _ in self.units)
+            digits = max(len(str(int(min(size / last, _MOST_DIGITS)))) for size, last, _ in self.units)
             exponent = math.floor(math.log10(largest.numerator) - math.log10(largest.denominator))
             unit = max(unit, Fraction(10) ** (exponent + 1 - max(digits, 6)))
         return (a, b, c, d, e, f), min(2 * unit, _MOST_SLACK * largest)
@@ -985,9 +985,10 @@ def _toml_table(name: str, table: Mapping[str, Any]) -> BodyInFile:
         raise InputError(f"{numbers.where}: a rotor in a file is not supported.", "Describe the whole body.")
     if (size := numbers.number(str(table.get("gravity", "9.81")), "gravity")) < 0:
         raise refusal(f"{numbers.where}: gravity", "0 or positive", six_digits(size), "Give its size, such as 9.81.")
+    gravity = (Fraction(0), Fraction(0), -size)
     note = "" if "centre" in table else "The file has no centre: the centre of mass is taken to be the pivot."
-    extra: dict[str, Any] = {"gravity": (Fraction(0), Fraction(0), -size), "at_pivot": about == "pivot", "note": note}
-    return BodyInFile(name, mass, centre, six, slack, si=False, **extra)
+    at_pivot = about == "pivot"
+    return BodyInFile(name, mass, centre, six, slack, gravity=gravity, at_pivot=at_pivot, si=False, note=note)
 
 
 def _texts(values: Any) -> list[str]:

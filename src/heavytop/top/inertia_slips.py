@@ -192,14 +192,17 @@ def slips(body: MassProperties) -> list[Slip]:
     if not possible:
         mends = [pair for pair in _mends(body) if realisable(pair[1].central, body.slack) and _in_shape(pair[1])]
         mends.sort(key=lambda pair: _ROUND * _products(pair[1]) > _products(body))
-        return [_possible(slip) if len(mends) > 1 else slip for slip, _ in mends]
+        return [_possible(slip) if len(mends) > 1 or slip.name in _MEND_NEARLY_ALL else slip for slip, _ in mends]
     return [*_of_units(body), *_of_products(body)][:3] or [*_beyond_shape(body)]
 
 
+_MEND_NEARLY_ALL = ("about_centre", "millimetres")
+"""Slips that explain nearly every tensor beyond the triangle inequality."""
+
+
 def _possible(slip: Slip) -> Slip:
-    """A slip beside others that mend the tensor as well."""
-    first, rest = slip.sentence[0], slip.sentence[1:]
-    return slip if slip.sentence.startswith("It would") else replace(slip, sentence=f"Possibly, {first.lower()}{rest}")
+    """A slip that others may explain as well."""
+    return replace(slip, sentence=f"Possibly, {slip.sentence[0].lower()}{slip.sentence[1:]}")
 
 
 def _rod(body: MassProperties) -> Slip:
@@ -235,18 +238,17 @@ def _mends(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
     sentence = "The products of inertia have the opposite sign: I12 is minus the integral of x y dm."
     if flipped != n:
         yield _mend(body, "signs_of_products", sentence, flipped)
-    if not body.at_pivot and any(body.centre):  # which mends nearly every tensor beyond the triangle inequality
-        sentence = "It would be explained by a Steiner term that was subtracted from a tensor about the centre of mass."
+    if not body.at_pivot and any(body.centre):
+        sentence = "The tensor was already about the centre of mass when the Steiner term was subtracted."
         yield _mend(body, "about_centre", sentence, six_of(plus(rows(n), steiner(body.mass, body.centre))))
     if negative := sum(value < 0 for value in n[:3]):
         cause = "A moment of inertia is negative: its sign is" if negative == 1 else "Signs of moments of inertia are"
         yield _mend(body, "negative_moment", f"{cause} wrong.", (abs(n[0]), abs(n[1]), abs(n[2]), *n[3:]))
     if body.at_pivot:
-        sentence = "It would be explained by a tensor about the centre of mass that was read as about the pivot."
-        slip = Slip("about_centre", sentence, n)
+        slip = Slip("about_centre", "The tensor is about the centre of mass, and was read as about the pivot.", n)
         yield slip, replace(body, at_pivot=False)
         centre = _metres(body.centre)
-        sentence = "It would be explained by a centre of mass in millimetres beside a tensor in metres."
+        sentence = "The centre of mass is in millimetres, and the tensor in metres."
         yield Slip("millimetres", sentence, n, centre=centre), replace(body, centre=centre)
 
 

@@ -153,6 +153,7 @@ def test_a_tensor_multiplied_in_double_is_read_by_its_upper_entries(tmp_path: Pa
         ),
         ("0.0833333 0.0833334 1e-9", "unstable unstable stable", "unstable"),  # a rod, beyond the triangle by rounding
         ("2 1 1 0.0005 0 0", "stable unstable unstable", "stable"),  # a plate: 2.0000002 was written as 2
+        pytest.param(f"1.{5000 * '3'} 1 1 0 0 0", "stable unstable unstable", "stable", id="5000 digits"),
         ("200 100 100 0.05 0 0", "stable unstable unstable", "stable"),
         ("10 5 5.00001 0.00672027 -0.007475 0", "stable unstable unstable", "stable"),
     ],
