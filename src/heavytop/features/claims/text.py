@@ -76,10 +76,8 @@ def values_text(rows: Sequence[StatementVerdict]) -> list[RenderableType]:
         figures = row.figures or {}
         right = f"{figures['digits_right']} of {figures['digits_printed']}" if "digits_right" in figures else "?"
         cells = [figures.get("printed", ""), right, figures.get("tolerance", "half a unit")]
-        is_known = row.residual.startswith("off by ")
-        error, _, reason = row.residual.partition("; ") if is_known else ("?", "", row.residual)
-        cells.append(error.removeprefix("off by "))
-        reasons += [Text(f"{label(row)} {row.domain}: {reason}")] if reason else []
+        cells.append(row.error or "?")
+        reasons += [Text(f"{label(row)} {row.domain}: {row.reason}")] if row.reason else []
         table.add_row(Text(label(row)), Text(clip(row.domain, _WIDEST_TIME)), _verdict(row.holds), *map(Text, cells))
     proven = [row for row in rows if row.figures and "proven" in row.figures]
     lines = [Text("Proven: the true number is within the radius of the value.")] if proven else []

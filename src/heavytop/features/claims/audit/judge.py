@@ -55,6 +55,7 @@ class StatementVerdict:
     residual: "0", a closed form, or a bound by balls.
     conditions: of the proof; the row is undecided if one is not discharged.
     figures: of a published number, the printed text, the number of its correct digits, the proven value.
+    error, reason: of a published number, by how much it is off, and why it is undecided.
     """
 
     equation: str
@@ -68,6 +69,8 @@ class StatementVerdict:
     note: str = ""
     conditions: tuple[Condition, ...] = ()
     figures: Mapping[str, Any] | None = None
+    error: str = ""
+    reason: str = ""
 
     def to_json(self) -> dict[str, Any]:
         """The row with the keys that scripts rely on."""

@@ -10,7 +10,7 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import islice, product
-from time import process_time
+from time import thread_time
 
 import msgspec
 import sympy
@@ -134,9 +134,9 @@ class FileClaim(ABC):
 
     def audit(self, about: System, progress: Progress = silent) -> Audit:
         """The audit as a claim about a system."""
-        content, began = self.content, process_time()
+        content, began = self.content, thread_time()
         rows = self.rows(about, progress)
-        seconds = process_time() - began
+        seconds = thread_time() - began
         deciding: tuple[tuple[str, str], ...] = ()
         if verdict_of(rows) == "undecided":
             more = rows
@@ -168,13 +168,13 @@ class FileClaim(ABC):
 
         seconds: duration of the audit; the search ends after :data:`_SEARCH`.
         """
-        began, assumed = process_time(), self.content.assume
+        began, assumed = thread_time(), self.content.assume
         signs = set(re.findall(r"\w+", " ".join(text for text in assumed if "!=" not in text)))
         bounds = [c.assumption for row in rows for c in row.conditions if c.assumption and not c.discharged]
         bounds += [f"{name} > 0" for name in self.content.parameters if name not in signs]
         deciding: list[tuple[str, str]] = []
         for bound in dict.fromkeys(bounds):
-            if process_time() - began + 2 * seconds > _SEARCH or len(deciding) == _MOST_ASSUMPTIONS:
+            if thread_time() - began + 2 * seconds > _SEARCH or len(deciding) == _MOST_ASSUMPTIONS:
                 break
             if (bound.replace(">", "!="), "holds") in deciding:  # a weaker one suffices
                 continue

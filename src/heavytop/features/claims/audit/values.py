@@ -357,11 +357,11 @@ def _row(figure: Figure, judged: Judgement | None, method: str, missing: str) ->
     figures: dict[str, Any] = {"printed": figure.number.text}
     figures |= {} if figure.tolerance is None else {"tolerance": figure.tolerance_text}
     figures["digits_printed"] = figure.number.digits
-    residual, witness = missing, None
+    error, reason, witness = "", missing if judged is None or judged.holds is None else "", None
     if judged is not None:
         value, r = _texts(judged.middle, judged.radius, figure.number.digits + _MORE_DIGITS)
         figures |= {"digits_right": judged.right, "proven": {"value": value, "radius": r}}
-        residual = _error_text(judged) + (f"; {missing}" if judged.holds is None else "")
+        error = _error_text(judged)
     if judged is not None and judged.holds is False:
         value, r = _texts(figure.number.value - judged.middle, judged.radius, _WITNESS_DIGITS)
         witness = {"parameters": {}, "t": figure.time_text, "value": value, "radius": r}
@@ -371,11 +371,13 @@ def _row(figure: Figure, judged: Judgement | None, method: str, missing: str) ->
         "printed",
         f"t={figure.time_text}",
         None if judged is None else judged.holds,
-        residual,
+        "; ".join(filter(None, (error and f"off by {error}", reason))),
         f"{name} = {figure.number.text} within {allowed} at t = {figure.time_text}",
         witness,
         note=method,
         figures=figures,
+        error=error,
+        reason=reason,
     )
 
 
@@ -388,9 +390,9 @@ def _texts(middle: Fraction, r: Fraction, digits: int) -> tuple[str, str]:
 def _error_text(judged: Judgement) -> str:
     low, high = (decimal_text(round_to(part, 64), 3) if part else "0" for part in judged.error)
     if low == high:
-        return f"off by {high}"
+        return high
     most = radius_text(judged.error[1])
-    return f"off by less than {most}" if low == "0" else f"off by {low} to {most}"
+    return f"less than {most}" if low == "0" else f"{low} to {most}"
 
 
 class _KnownNumbers:
