@@ -55,7 +55,8 @@ def bless(measured: Path, baseline: Path, summary: str, comparison: Comparison |
             rows_of.setdefault(subject.name, []).append(row)
     for name, rows in rows_of.items():
         if not any(row.metrics for row in rows):
-            raise PeerFailed(f"No row of {name} has a number, so no baseline is made: {rows[0].reference.reason}.")
+            reason = rows[0].reference.reason or rows[0].outcome
+            raise PeerFailed(f"No row of {name} has a number, so no baseline is made: {reason}.")
     text = f"Begin the baseline of accuracy\n\n{summary}\n" if comparison is None else _moved(comparison)
     replace(measured / MESSAGE, text.encode())
     with writable(baseline, "Give a writable --baseline."):

@@ -260,7 +260,8 @@ def poincare(
         section, Crossings, "section", "events", "Give the result of heavytop.poincare or heavytop.events."
     )
     palette = list(colours) if isinstance(colours, str) else ordered(colours, "colours", _COLOURS)
-    palette = palette or [()]
+    if not palette:
+        raise InputError("No colours were given.", _COLOURS)
     total = sum(map(len, listed))
     if not total:
         raise InputError("The section has no points.", "Give a later until, or another function.")
