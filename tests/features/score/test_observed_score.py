@@ -398,7 +398,7 @@ def test_a_tensor_about_the_other_point_is_told(about: str, tmp_path: Path) -> N
     file.write_text(lines(weight="", start_quaternion="", omega="0,150,-4.61538", rows=rows, **keys), "utf-8")
     told = [text for text in read(file, None, True).warnings() if "not a rigid body's" in text]
     assert len(told) == (about == "pivot")
-    assert all("a tensor about the centre of mass that was read as about the pivot" in text for text in told)
+    assert all("the tensor is about the centre of mass, and was read as about the pivot" in text for text in told)
 
 
 @pytest.mark.slow

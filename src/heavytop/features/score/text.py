@@ -80,7 +80,7 @@ _CONVENTION_SENTENCES = {
     "weight": "The weight is {factor} times the weight given",
     "mass": "The mass is {factor} times the mass given",
     "top": "{number} is {factor} times the value given",
-    "start": "The start differs: rotated by {angle} degrees, with Ω = ({omega}) in body axes",
+    "start": "The start differs: {turned}Ω = ({omega}) in body axes",
     "column_scaled": "{column} is scaled by {factor}",
     "column_order": "The columns of {columns} are interchanged",
     "no_gravity": "The motion is without gravity: gravity = 0 fits",
@@ -145,9 +145,9 @@ def sentence(fit: Diagnosis) -> str:
 
 
 def _mistake(fit: Diagnosis) -> str:
-    numbers = fit.numbers
-    mistake = "; ".join(_CONVENTION_SENTENCES[kind].format(**numbers) for kind in fit.kind.split("+"))
-    mistake = mistake.replace("rotated by 0 degrees, with ", "")
+    numbers, angle = fit.numbers, fit.numbers.get("angle", "0")
+    turned = "" if angle == "0" else f"rotated by {angle} degrees, with "
+    mistake = "; ".join(_CONVENTION_SENTENCES[kind].format(**numbers, turned=turned) for kind in fit.kind.split("+"))
     mistake += f" ({numbers['entries']} only)" if "entries" in numbers else ""
     mistake += f" ({numbers['steps']})" if "steps" in numbers else ""
     mistake += f", with inertia = {numbers['inertia']} about the pivot" if "inertia" in numbers else ""
