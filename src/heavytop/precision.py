@@ -635,10 +635,13 @@ def ordered(values: Any, what: str, remedy: str) -> list[Any]:
 
 def _is_foreign(member: Any) -> bool:
     """Whether a member of an array is neither a number nor a row."""
+    if isinstance(member, list | tuple) or getattr(member, "shape", None):
+        return False
     try:
-        return not (isinstance(member, list | tuple) or getattr(member, "shape", None)) and exact(member) is None
+        exact(member)
     except InputError:
         return True
+    return False
 
 
 def dot(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
